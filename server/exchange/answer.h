@@ -9,24 +9,25 @@
 #include "server/base/note.h"
 #include "server/exchange/values.h"
 
-/// What a model is asked, and which model answered.
+/// Questions to a model, and the identity of the model that answered.
 namespace trammel::exchange {
 
-/// Which joints are rails: theirs are mm. A joint beyond the list is none.
+/// True for each joint that is a rail; its values are in mm. A joint beyond the end of the list is
+/// no rail.
 using Rails = std::vector<bool>;
 [[nodiscard]] inline bool is_rail(const Rails& rails, std::size_t joint) {
   return joint < rails.size() && rails[joint];
 }
 
-/// How the arm comes to a pose; what is not known is neutral.
+/// The approach of the arm to a pose; unknown values are neutral.
 struct Approach {
   std::vector<int> directions = {};  ///< of each joint: -1, 0, +1; empty: not known
   std::optional<double> temperature_c = {};
   std::optional<double> time_s = {};
 };
 
-/// Joints that are asked about. They stay rad, as on the wire and in records: a degree would change
-/// their last bit, and a record asked again must give the same answer to the last bit.
+/// Joints of a question. They stay rad, as on the wire and in records: a conversion to degrees
+/// would change their last bit, and a repeated record must give the same answer to the last bit.
 struct AskedJoints {
   std::vector<double> q_rad;  ///< of a rail mm
   Approach approach = {};
@@ -50,12 +51,12 @@ struct ModelInfo {
   double training_age_s = 0;
   std::optional<std::int64_t> measured_at_unix_s =
       {};                                 ///< of its newest measurement; empty: not recorded
-  std::optional<double> data_age_s = {};  ///< of that measurement
+  std::optional<double> data_age_s = {};  ///< the age of that measurement
   int training_poses = 0;
   std::optional<double> validation_rms_mm = {};  ///< empty: nothing was held out
   bool in_force = false;
-  /// What a user of the model should know, the gravest first. In a list of versions only the one in
-  /// force has them.
+  /// Notes for users of the model, the gravest first. In a list of versions only the one in force
+  /// has them.
   std::vector<Note> notes = {};
   /// Where the millimetres come from, for people, of the one in force; empty in other answers.
   std::vector<std::string> budget = {};

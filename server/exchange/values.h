@@ -6,9 +6,8 @@
 #include <tuple>
 #include <vector>
 
-/// What people and other programs are told of a prediction and of a correction, and the one table
-/// of their figures. Lengths are mm and angles deg; vectors and covariances are in B, the robot's
-/// base.
+/// The values of a prediction and of a correction in people's units, and the one table of their
+/// figures. Lengths are mm and angles deg; vectors and covariances are in B, the robot's base.
 namespace trammel::exchange {
 
 /// Where a frame is. `X_BT` is the tool T seen from the robot's base B.
@@ -24,7 +23,7 @@ struct Prediction {
   Pose predicted;                    ///< X_BT: where it will be
   std::array<double, 3> error_mm{};  ///< predicted - nominal, mm
   std::array<double, 3>
-      stddev_mm{};  ///< of one measurement of it, the instrument's noise included, mm
+      stddev_mm{};  ///< mm, of one measurement of the position, with the instrument's noise
   std::array<double, 3> true_stddev_mm{};  ///< of the true error, mm
   std::array<double, 9> covariance_mm2{};  ///< 3 x 3 of one measurement, row by row, mm²
   std::array<double, 3> rotation_deg{};    ///< rotation vector from nominal to predicted, deg
@@ -41,18 +40,17 @@ struct CorrectedTarget {
       status;      ///< `ok out_of_domain joint_limit unreachable singular not_converged refused`
   Pose commanded;  ///< X_BT to command so that the tool lands on the wanted pose
   std::vector<double> joints_deg;  ///< the controller's joints for it, deg (of a rail mm)
-  double error_before_mm =
-      0;  ///< rms distance to expect without correction, mm; NaN: nothing to say
-  double error_after_mm = 0;     ///< the same with it, mm
+  double error_before_mm = 0;    ///< rms distance to expect without correction, mm; NaN: not known
+  double error_after_mm = 0;     ///< mm, with the correction
   double sigma_mm = 0;           ///< stddev of the true position, rms of the axes, mm
   double sigma_measured_mm = 0;  ///< the same of one measurement, the instrument's noise included
   double turn_before_deg = 0;    ///< orientation error to expect without correction, deg
-  double turn_after_deg = 0;     ///< the same with it, deg
+  double turn_after_deg = 0;     ///< deg, with the correction
   int iterations = 0;            ///< of the correction
   std::string message;           ///< why it is not ok
 };
 
-/// Where a figure stands in a table (CSV) of answers.
+/// The place of a figure in a table (CSV) of answers.
 enum class Place {
   kNowhere,     ///< neither in tables nor in JSON
   kJsonOnly,    ///< in JSON
@@ -70,14 +68,14 @@ struct Figure {
   const char* columns;  ///< names of its numbers, with commas between; a number without is left out
   Place place;          ///< in tables
 };
-/// So that a table can leave out the types.
+/// Deduces the types, so that a table can leave them out.
 template <typename Answer, typename Value>
 Figure(const char*, Value Answer::*, const char*, Place) -> Figure<Answer, Value>;
 
 /// Columns of a pose.
 inline constexpr const char* kPoseColumns = "x_mm,y_mm,z_mm,qw,qx,qy,qz";
 
-/// The figures of a prediction, in the order of JSON. A new one needs its line here.
+/// The figures of a prediction, in the order of JSON. A new figure needs a line in this list.
 inline constexpr std::tuple kPredictionFigures{
     Figure{"error_mm", &Prediction::error_mm, "dx_mm,dy_mm,dz_mm", Place::kInFront},
     Figure{"stddev_mm", &Prediction::stddev_mm, "sx_mm,sy_mm,sz_mm", Place::kInFront},
@@ -104,7 +102,7 @@ inline constexpr std::tuple kCorrectionFigures{
     Figure{"turn_after_deg", &CorrectedTarget::turn_after_deg, "turn_after_deg", Place::kBehind},
     Figure{"iterations", &CorrectedTarget::iterations, "iterations", Place::kInFront}};
 
-/// Calls `take(figure)` for each figure of one of these tables, in its order.
+/// Calls `take(figure)` for each figure of one of these tables, in order.
 template <typename Table, typename Take>
 constexpr void each_figure(const Table& figures, const Take& take) {
   std::apply([&](const auto&... figure) { (take(figure), ...); }, figures);
