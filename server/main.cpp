@@ -86,8 +86,7 @@ int refuse_start(std::vector<Error> problems) {
   return refuse(all);
 }
 
-/// Prints what a start would meet on this host. Cells that would go dark are named whatever else is
-/// wrong.
+/// Prints the result of a start on this host. Cells that would have no model are named in any case.
 int check(const ServerReading& server, const std::string& path, StoreToCheck store) {
   const StartCheck found = check_start(server, path, store);
   for (const std::string& note : found.notes) fmt::print("{}\n", shown(note));
@@ -134,8 +133,8 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
-/// Whoever asks for nonsense all day does not fill the log: of one kind a few lines a minute are
-/// written.
+/// Logs a call. A flood of faulty calls does not fill the log: of each kind a few lines a minute
+/// are written.
 void log_call(const CallReport& call) {
   const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
   const LogAbout about = {{"cell", call.cell},   {"operation", call.operation},
@@ -151,9 +150,9 @@ void log_call(const CallReport& call) {
   }
 }
 
-/// Ignores signals that would end the process though it can go on: a pipe nobody reads, a file that
-/// may grow no further. Both are errors of the call that met them. The processes that compute get
-/// the signals as they were.
+/// Ignores signals that would end the process needlessly: a pipe without reader, and a file at its
+/// size limit. Both become errors of the call in which they occur. The computing processes get the
+/// signals unchanged.
 void ignore_what_calls_report() {
   for (const int number : {SIGPIPE, SIGXFSZ}) {
     struct sigaction ignored {};
@@ -169,8 +168,8 @@ void add_cells(const ServedCells& cells, DdsService& service, Trainer& trainer) 
   service.cells_added();
 }
 
-/// Reads the server file again and takes on what can change while it serves. Of a file that is
-/// refused nothing is taken.
+/// Reads the server file again and applies the changes that are possible while serving. A refused
+/// file changes nothing.
 void reload(const Arguments& arguments, ServerConfig& config, DdsService& service,
             Trainer& trainer) {
   tell_manager_reloading();
@@ -195,7 +194,7 @@ void reload(const Arguments& arguments, ServerConfig& config, DdsService& servic
   tell_manager_ready("serves");
 }
 
-/// The parts of a server that serves, and what is told of them.
+/// The parts of a running server, and the data that it reports.
 struct Serving {
   ServerConfig& config;
   const Arguments& arguments;
@@ -240,9 +239,10 @@ void tell_ready(const ServerConfig& config) {
   tell_manager_ready("serves");
 }
 
-/// Starts to answer; returns the server's name, which is its own for as long as that is held.
+/// Starts to answer. Returns the lock on the server's name. The server owns the name as long as it
+/// holds the lock.
 Result<PortLock> open_to_clients(const DdsOptions& options, DdsService& service) {
-  // A second copy of this server is told about the port first.
+  // A second copy of this server gets the error about the port first.
   const Status free = PortLock::take(options.address, options.port).map([](const PortLock&) {});
   if (!free) return tl::make_unexpected(free.error());
   auto name = PortLock::take_name(options.domain, options.server_id);
@@ -251,7 +251,7 @@ Result<PortLock> open_to_clients(const DdsOptions& options, DdsService& service)
   return name;
 }
 
-/// Says how safe acknowledgements are, as far as the database says it now.
+/// Reports how safe acknowledgements are, by the present state of the database.
 void tell_record(const Store& store) {
   const RecordState record = store.record();
   if (record.kind != "postgresql" || record.survives.empty()) return;
@@ -330,7 +330,8 @@ int run(const Arguments& arguments) {
   ServerReading server = read_server(arguments.config);
   ServerConfig& config = server.config;
   config.trainer.compute.program = {"/proc/self/exe",
-                                    kComputeWord};  // this very file, also where it was replaced
+                                    kComputeWord};  // this very program file, even if it was
+                                                    // replaced on disk
   put_over(config, arguments);
   config.trainer.self =
       ServerSelf::here(config.dds.program_version, config.serves, config.trainer.trains);

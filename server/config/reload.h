@@ -14,10 +14,11 @@ struct ReloadPlan {
   std::vector<std::string> later;  ///< keys that differ and change with the next start
 };
 
-/// Takes on: cells that are added (one that is left out, or whose file or robot file has changed:
-/// with the next start); level and format of the log; of `dds` how much may wait (client_requests,
-/// client_mb, queued_requests, queued_mb, cell_share); of `trainer` queue_capacity and keep_models,
-/// keep_batches, keep_answers. What the command line says instead of the file is to stand in both.
+/// Plans the changes that a running server takes on: added cells; level and format of the log; the
+/// queue limits of `dds` (client_requests, client_mb, queued_requests, queued_mb, cell_share);
+/// queue_capacity, keep_models, keep_batches and keep_answers of `trainer`. A removed cell, or one
+/// with a changed cell or robot file, takes effect at the next start. Values that the command line
+/// overrides must be overridden in both.
 [[nodiscard]] ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file);
 
 }  // namespace trammel

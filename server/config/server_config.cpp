@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxName = 64;  // likewise, bytes
 constexpr int kLeastMemory =
-    64;  // MiB, of a job: what the program itself takes, and something to compute with
+    64;  // MiB, of a job: the program's own memory, and a minimum to compute with
 constexpr int kMaxDomain = 232;  // above it the port numbers of DDS overflow
 
 int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower,
@@ -51,8 +51,8 @@ std::string server_id(const YamlMap& map, const std::string& key) {
   return id;
 }
 
-/// The agreements of the file. A word that cannot be read is refused by itself; the address is not
-/// blamed for it.
+/// The security settings of the file. An unreadable word is reported by itself, without a further
+/// error about the address.
 struct Consent {
   bool network = true;
   bool without_security = true;
@@ -65,8 +65,8 @@ Consent consent(const YamlMap& map) {
   return given;
 }
 
-/// Reads an IPv4 address. Refuses others than loopback unless the network is allowed, and unless it
-/// is said who may do what there, or that everybody may do everything.
+/// Reads an IPv4 address. Refuses addresses other than loopback unless the network is allowed, and
+/// unless the file states who may do what there, or that everybody may do everything.
 std::string address(const YamlMap& map, const std::string& otherwise, const Consent& given) {
   const std::string text = map.text("address", otherwise);
   in_addr parsed{};
@@ -89,7 +89,7 @@ std::string address(const YamlMap& map, const std::string& otherwise, const Cons
   return text;
 }
 
-/// The position of each is its number, so that none is said twice.
+/// The position of each entry is its number, so no number occurs twice.
 std::vector<HostPort> discovery_servers(const YamlMap& map, const DdsOptions& dds) {
   const std::string key = "discovery_servers";
   std::vector<HostPort> places;
@@ -204,8 +204,8 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
       [&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
 }
 
-/// Pages and metrics stay on this host: whoever reads them from elsewhere goes through a server
-/// that asks who he is.
+/// Reads the address of pages and metrics, which must be on this host. Readers elsewhere go through
+/// a server that authenticates them.
 void read_http(const YamlMap& map, HttpOptions& http) {
   map.only({"address", "port"});
   map.attempt([&] {

@@ -64,7 +64,7 @@ bool is_held(const Status& status) {
   return !status && status.error().code == ErrorCode::kConflict;
 }
 
-/// Notes what is wrong with the values of one server file.
+/// Collects the faults in the values of one server file.
 class Verdict {
  public:
   Verdict(const std::string& path, StoreToCheck store, StartCheck& check)
@@ -73,14 +73,14 @@ class Verdict {
   void add(const char* key, const Status& status) {
     if (!status) check_.problems.push_back(at_key(key, path_, status.error()));
   }
-  /// A file that another process holds is no problem beside a copy of the store.
+  /// If the server runs on a copy of the store, a file that another process holds is no problem.
   void add_holdable(const char* key, const Status& status) {
     if (store_ == StoreToCheck::kOwn || !is_held(status)) return add(key, status);
     check_.notes.push_back(fmt::format("{} is in use, which does not matter to this check: {}", key,
                                        sentence(status.error())));
   }
 
-  /// A database that is away is no problem either: the service starts without it.
+  /// A database that is away is not a problem either: the service starts without it.
   void add_store(const Status& store) {
     if (store || store.error().code != ErrorCode::kUnreachable) return add_holdable("store", store);
     check_.notes.push_back("the store is away, and the service would serve copies: " +

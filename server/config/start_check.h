@@ -7,24 +7,21 @@
 
 namespace trammel {
 
-/// The outcome that a start would have on this host. Found without starting: nothing is changed or
-/// created.
+/// The result of a start on this host, found without starting: nothing is changed or created.
 struct StartCheck {
-  std::vector<Error> problems;     ///< a start would fail; with file, key and what to do
+  std::vector<Error> problems;     ///< each would make a start fail; with file, key and remedy
   std::vector<std::string> notes;  ///< good to know
-  std::vector<std::string>
-      dark;  ///< cells that would lose the model that they are served with, and why
+  std::vector<std::string> dark;   ///< cells that would lose their present model, and the reason
 };
 
-/// Whose store is looked at: the one that the server file names, or a copy of it, to which nobody
-/// writes.
+/// The store to examine: the one in the server file, or an unused copy of it.
 enum class StoreToCheck { kOwn, kCopy };
 
-/// Checks the store, the log file, the address and the port that the server file at `path` names,
-/// if they could be read. The errors of reading come first. If this server seems to run already
-/// (its port and its store are both held by servers), that is a note. Beside a copy of the store
-/// each of these is a note: the service is meant to run meanwhile. Looks also at what the cells
-/// would be served with by this program, in the store as it is.
+/// Checks the store, the log file, the address and the port in the server file at `path`, as far as
+/// they could be read. The errors of reading come first. If this server seems to run already
+/// (servers hold both its port and its store), the result is a note. With a copy of the store each
+/// of these is a note, since the service is meant to run meanwhile. Also reports the models with
+/// which this program would serve the cells from the store as it is.
 [[nodiscard]] StartCheck check_start(const ServerReading& server, const std::string& path,
                                      StoreToCheck store = StoreToCheck::kOwn);
 

@@ -27,7 +27,7 @@ void ClientNames::announced(const std::string& participant, const std::string& c
   const MutexLock lock(mutex_);
   if (name.empty() && known_.size() >= kClaims && !known_.contains(participant)) return;
   Known& known = known_[participant];
-  if (known.left) known = {};  // it is new, and is let in anew
+  if (known.left) known = {};  // a participant that has left and returns counts as new
   if (!name.empty()) known.name = name;
   known.claim = claim_of(name, claimed, address);
 }

@@ -14,22 +14,23 @@ namespace trammel {
 class ClientNames {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  /// Requests of a participant that has left are still carried out; its name is kept so long.
+  /// The server still carries out requests of a participant that has left. It keeps the name for
+  /// this time.
   static constexpr std::chrono::seconds kKept{30};
-  /// The number of participants whose claims are kept at once, where these are no names that fit.
+  /// The number of participants whose unverified claims are kept at once.
   static constexpr std::size_t kClaims = 4096;
 
-  /// Notes what a participant says of itself, before it is let in. Only a name that fits its GUID
-  /// counts. `address`: where it says that it can be reached.
+  /// Records the claims of a participant before it is admitted. Only a name that matches its GUID
+  /// counts. `address`: the address that it announces.
   void announced(const std::string& participant, const std::string& claimed,
                  const std::string& address = "");
   void let_in(const std::string& participant);
-  /// The claim of the participant about itself, which nobody could confirm: `says it is
-  /// CN=anna,O=Works, at 10.1.0.7`.
+  /// What the participant claims to be, which nobody could confirm: `says it is CN=anna,O=Works, at
+  /// 10.1.0.7`.
   std::string refused(const std::string& participant);
   void left(const std::string& participant, Time now = std::chrono::steady_clock::now());
 
-  /// Empty: it was not let in, or has no name that fits.
+  /// Empty: it was not admitted, or its name does not match.
   [[nodiscard]] std::string of(const std::string& participant) const;
 
  private:

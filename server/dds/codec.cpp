@@ -21,7 +21,7 @@ constexpr double kQuaternionTolerance = 1e-3;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kNoTime = -1;
 constexpr double kTemperatureLimit = 1e3;      // degrees Celsius, as in files
-constexpr std::uint32_t kRetryAfterMs = 1000;  // of a full queue, where nobody knows better
+constexpr std::uint32_t kRetryAfterMs = 1000;  // of a full queue, without a better estimate
 
 constexpr std::int64_t kLastTime = 253'402'300'799;  // the end of the year 9999
 
@@ -29,12 +29,12 @@ double age_s(std::int64_t since_unix_s, std::int64_t now_unix_s) {
   return static_cast<double>(std::max<std::int64_t>(0, now_unix_s - since_unix_s));
 }
 
-/// As clients can show it.
+/// The time, if clients can display it.
 std::int64_t told_time(std::int64_t unix_s) {
   return unix_s < 0 || unix_s > kLastTime ? kNoTime : unix_s;
 }
 
-/// The times of a model, and what follows from them.
+/// Sets the times of a model, and the ages that follow from them.
 void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measured_at,
                std::int64_t now_unix_s, wire::ModelInfo& info) {
   const std::int64_t trained = told_time(trained_at);

@@ -24,8 +24,8 @@ namespace trammel {
 [[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain,
                                             const std::string& where);
 
-/// Refuses directions that are not one of -1, 0, +1 for each joint, and infinite numbers. What is
-/// not known stays so.
+/// Refuses directions that are not one of -1, 0, +1 for each joint, and infinite numbers. Unknown
+/// values stay unknown.
 [[nodiscard]] Status read_approach(const wire::Approach& approach, const Chain& chain,
                                    const std::string& where, PoseContext& context);
 
@@ -36,7 +36,7 @@ namespace trammel {
 [[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force,
                                       std::int64_t now_unix_s);
 [[nodiscard]] wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s);
-/// As it is published: without its batches and times, which to_wire(DatedJob) has.
+/// The published form, without batches and times, which to_wire(DatedJob) has.
 [[nodiscard]] wire::Job to_wire(const JobProgress& progress);
 [[nodiscard]] wire::Job to_wire(const Trainer::DatedJob& job);
 [[nodiscard]] wire::BatchInfo to_wire(const StoredBatch& batch);
@@ -71,8 +71,8 @@ template <typename Reply>
 
 [[nodiscard]] std::int64_t unix_now_s();
 
-/// The answer to the same request, where `reply`, a Reply, is too large for the wire or holds what
-/// it cannot carry.
+/// An error reply to the same request, for a `reply` that is too large for the wire or has values
+/// that the wire cannot carry.
 template <typename Reply>
 [[nodiscard]] std::shared_ptr<void> instead_of(const void* reply) {
   const wire::ReplyHeader& meant = static_cast<const Reply*>(reply)->header();

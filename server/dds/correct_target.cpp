@@ -40,7 +40,7 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
   return target;
 }
 
-/// Of a robot with these rails.
+/// The reply of a robot with these rails.
 wire::CorrectedTarget told(const Correction& correction, const exchange::Rails& rails) {
   exchange::CorrectedTarget answer = exchanged(correction, rails);
   answer.message = cut(answer.message, kMaxMessage);
@@ -78,7 +78,7 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
       reply_.corrections()[i] = told(correction, rails_);
       count_in(work, correction);
       if (i == first && correction.q.size() > 0)
-        remember(correction.q);  // one of each portion stands for it
+        remember(correction.q);  // one of each portion represents it
     }
     work_.add(subject_.served->cell, work);
   }

@@ -78,7 +78,8 @@ TurnLimits compute_limits(const DdsOptions& options) {
   return limits;
 }
 
-/// Such requests cannot be interrupted: no client may take all workers, however many it sends.
+/// The limits for reading requests. These cannot be interrupted, so no client may occupy all
+/// workers.
 TurnLimits limits_of_reads(const DdsOptions& options) {
   TurnLimits limits = compute_limits(options);
   limits.workers = 4;
@@ -180,7 +181,7 @@ class DdsService::Running {
     watchdog_.reset();
     status_thread_ = {};
     tell_refused(Clock::now() +
-                 PacketReport::kAtMostEvery);  // also what would have been told later
+                 PacketReport::kAtMostEvery);  // includes reports that were still due
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
     for (Lane* lane : lanes()) lane->stop();
@@ -266,7 +267,7 @@ class DdsService::Running {
         changes_(limits_of_changes(options), room_, kBehindComputing),
         core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {}
 
-  /// Last: who hears of the place may ask at once.
+  /// Comes last, because clients may ask as soon as they know the place.
   Status tell_place() {
     if (options_.discovery_servers.empty()) return {};
     const wire::Place place{{options_.address, options_.port}, options_.domain, options_.server_id};
@@ -333,7 +334,8 @@ class DdsService::Running {
     }
   }
 
-  /// Tells what did not reach the service, as far as it is due by then.
+  /// Reports the packets and participants that did not reach the service, as far as a report is
+  /// due.
   void tell_refused(Clock::time_point now) {
     if (!packets_) return;  // the start has failed
     if (const auto dropped = packets_->due(now)) packet_listener_("packets_dropped", *dropped);
@@ -341,7 +343,7 @@ class DdsService::Running {
       packet_listener_("participant_refused", refused);
   }
 
-  /// The threads of this service and of the library that the watchdog watches. Each counts its own
+  /// The threads of this service and of the library for the watchdog. Each thread counts its own
   /// work.
   [[nodiscard]] std::vector<MovingPart> moving_parts(
       const std::shared_ptr<wire::HeardOfItself>& heard) const {
@@ -357,8 +359,8 @@ class DdsService::Running {
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
     parts.push_back({"reading requests", [this] { return reads_.unseen(); }});
     parts.push_back({"changing requests", [this] { return changes_.unseen(); }});
-    // A portion of these takes milliseconds. Who waits for them is told at once; an end would lose
-    // what others compute.
+    // A portion of these takes milliseconds. Waiting clients get status reports, and ending the
+    // process would lose the computations of others.
     parts.push_back(
         {"computing predictions", [this] { return predictions_.oldest_portion(); }, false});
     parts.push_back(
@@ -419,7 +421,7 @@ class DdsService::Running {
   std::jthread replies_thread_;
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;
-  wire::ParticipantPtr beacon_;  // what discovery servers tell of it; null: none
+  wire::ParticipantPtr beacon_;  // the announcement through discovery servers; null: none
 };
 
 Status check_security(const std::string& folder) {

@@ -15,37 +15,36 @@
 
 namespace trammel {
 
-/// Refuses what start() would refuse in the folder of certificates and permissions
-/// (idl/transport/security.h); nothing where it is empty.
+/// Checks the folder of certificates and permissions as start() would (idl/transport/security.h);
+/// an empty name is accepted.
 [[nodiscard]] Status check_security(const std::string& folder);
 /// Checks that requests can be recorded there; makes nothing.
 [[nodiscard]] Status check_records(const RecordOptions& options);
 
-/// Told of what did not reach the service: `packets_dropped` or `participant_refused`, and a
-/// sentence.
+/// Receives an event, `packets_dropped` or `participant_refused`, and a sentence.
 using PacketListener = std::function<void(const char* event, const std::string& what)>;
 
-/// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the
-/// threads that work on requests (schedule/lane.h: DdsOptions::compute_workers for each of
-/// PredictError and CorrectTarget, some for what reads and some for what changes), one that sends
-/// replies which had to wait, and one that publishes its status every second. stop() ends them all.
-/// A watchdog ends the process when these threads or the library's hang (watchdog.h). Thread-safe.
+/// The service on DDS: answers the requests of idl/ and publishes the state topics. It owns several
+/// threads. Worker threads handle requests (schedule/lane.h: DdsOptions::compute_workers for each
+/// of PredictError and CorrectTarget, some for reading and some for changes). One thread sends
+/// replies that had to wait, and one publishes the status every second. stop() ends them all. A
+/// watchdog ends the process if these threads or the library's hang (watchdog.h). Thread-safe.
 class DdsService {
  public:
   /// `trainer`, `store` and `registry` outlive the service.
   DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry);
   ~DdsService();  ///< stops as stop()
 
-  /// Called with an event and a sentence for the log when packets have been dropped (idl/guard) or
-  /// participants refused, each at most once a minute and what is left at stop(), in a thread of
-  /// the service or in that of stop(). Set it before start().
+  /// Called with an event and a sentence for the log when packets were dropped (idl/guard) or
+  /// participants refused, each at most once a minute; the rest is reported at stop(). It runs in a
+  /// thread of the service or of the caller of stop(). Set it before start().
   void set_packet_listener(PacketListener listener);
-  /// Called when a request was to change something, or was refused, in the thread that answers it.
-  /// Set it before start().
+  /// Called for every request for a change, and for every refused request, in the thread that
+  /// answers it. Set it before start().
   void set_call_listener(CallListener listener);
-  /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses
-  /// a port that is taken, an address that this host does not have, and a server or cell name that
-  /// the wire does not allow.
+  /// Starts to answer, and publishes the models in force. Call it after Trainer::take_up(). Refuses
+  /// an occupied port, an address that this host does not have, and a server or cell name that the
+  /// wire does not allow.
   [[nodiscard]] Status start();
   /// Lets running requests finish, publishes that the server stops, and leaves DDS. May be started
   /// again.
@@ -56,13 +55,13 @@ class DdsService {
   /// Publishes the model that is in force for `cell` now.
   void publish_model(const std::string& cell);
 
-  /// From now on these limits of what may wait; of the rest of the options nothing changes.
+  /// Sets the queue limits; the other options stay unchanged.
   void set_limits(const DdsOptions& options);
-  /// The trainer serves more cells: clients are told.
+  /// Tells clients that the trainer serves more cells.
   void cells_added();
-  /// The work done since start(); none where the service does not run.
+  /// The work done since start(); empty if the service does not run.
   [[nodiscard]] ServiceFigures figures();
-  /// Tells whether its threads do their work. Waits for none of them.
+  /// Reports whether its threads do their work. Waits for none of them.
   [[nodiscard]] Movement movement();
 
  private:

@@ -32,11 +32,11 @@ class SubjectFinder {
   SubjectFinder(const Trainer& trainer, const ModelRegistry& registry)
       : trainer_(trainer), registry_(registry) {}
 
-  /// The cell's description. Refuses an unknown cell, tool or payload. Refuses a controller that
-  /// compensates: models are trained on data from one that does not.
+  /// The cell's description. Refuses an unknown cell, tool or payload. Refuses a controller with
+  /// compensation, since models are trained on data from one without.
   [[nodiscard]] Result<std::shared_ptr<const Cell>> cell(const wire::Context& context) const;
-  /// As cell(). Also refuses a cell without a model in force, an unknown version, and a model id
-  /// that is not in force.
+  /// As cell(), and also refuses a cell without a model in force, an unknown version, and a model
+  /// id that is not in force.
   [[nodiscard]] Result<Subject> find(const wire::Context& context);
 
  private:
@@ -63,7 +63,7 @@ class Handlers {
   /// The subject of the certificate of a DDS participant; empty: it has shown none.
   [[nodiscard]] std::string name_of(const std::string& participant) const;
 
-  /// The counts of what the cells were asked for since the start.
+  /// Counts of the requests to the cells since the start.
   [[nodiscard]] const WorkCounts& work() const { return work_; }
 
   using Predictions = std::unique_ptr<PortionedAnswer<wire::PredictErrorReply>>;
@@ -87,7 +87,7 @@ class Handlers {
       const wire::ReleaseBatchesRequest& request);
 
  private:
-  /// Who sent the request, for the audit trail: the name, the participant, the trace.
+  /// The sender of the request, for the audit trail: the name, the participant, the trace.
   [[nodiscard]] std::string who(const wire::RequestHeader& header) const;
   /// The job.
   [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
@@ -104,8 +104,8 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> models_of(const std::string& cell) const;
   /// The text of the model file of `version`; version 0 is the one in force.
   [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
-  /// The questions lately asked of the cell, answered by the model in force and by `version` beside
-  /// it; 0: alone.
+  /// The recent requests to the cell, answered by the model in force and by `version`; 0: by the
+  /// first alone.
   [[nodiscard]] Result<wire::ReadModelsReply> replayed(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ReadModelsReply> batch_of(const std::string& cell,
                                                        const std::string& id) const;
@@ -115,7 +115,7 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job,
                                                           bool page) const;
   [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
-  /// The newest `most` checks since then of one cell, or (empty) of each of all cells.
+  /// The newest `most` checks of one cell after `since`. An empty `cell` means each of all cells.
   [[nodiscard]] Result<wire::ReadModelsReply> health_of(const std::string& cell, std::int64_t since,
                                                         std::size_t most) const;
 
@@ -124,7 +124,7 @@ class Handlers {
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
   const ClientNames* names_ = nullptr;
-  WorkCounts work_;  // requests refer to it, and end before it
+  WorkCounts work_;  // requests refer to it, and are destroyed before it
 };
 
 /// Computes all of an answer in one thread.

@@ -32,14 +32,14 @@ class PacketReport {
   std::optional<Time> told_at_;
 };
 
-/// Counts the participants that DDS-Security refused (no certificate, one of another authority, one
-/// that was revoked) and says who they were, at most once a minute. Not thread-safe.
+/// Counts the participants that DDS-Security refused (without a certificate, with one of another
+/// authority, or with a revoked one) and names them, at most once a minute. Not thread-safe.
 class StrangerReport {
  public:
-  /// More than these in a minute are told as one.
+  /// More participants than this in a minute are reported in sum.
   static constexpr std::size_t kTold = 16;
 
-  /// `who`: what it says of itself. A participant tries again and again, under one GUID.
+  /// `who`: the name that it gives itself. A participant tries repeatedly, under one GUID.
   void refused(const std::string& who, const std::string& guid);
   /// One sentence for each who was refused since the last report; empty where the last report is
   /// too young.
@@ -53,7 +53,7 @@ class StrangerReport {
   };
   std::uint64_t tries_ = 0;
   std::map<std::string, Stranger>
-      strangers_;  // since the last report, by what they say of themselves
+      strangers_;  // since the last report, by the names that they give themselves
   std::optional<PacketReport::Time> told_at_;
 };
 

@@ -15,8 +15,8 @@ namespace trammel {
 
 namespace {
 
-/// A socket with this name in the abstract namespace: taken atomically, freed by the kernel. Below
-/// 0: it is taken.
+/// A socket with this name in the abstract namespace: claimed atomically, freed by the kernel.
+/// Below 0: the name is in use.
 int named_socket(const std::string& text) {
   sockaddr_un name{};
   name.sun_family = AF_UNIX;

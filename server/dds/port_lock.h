@@ -15,8 +15,9 @@ class PortLock {
   /// Refuses (kConflict) a port that another server, or any program, uses on `address`; (kUsage) an
   /// address that this host does not have.
   [[nodiscard]] static Result<PortLock> take(const std::string& address, std::uint16_t port);
-  /// Reserves the name of a server in a domain, for the same time. Refuses (kConflict) one that
-  /// another server of this host has: clients that ask for it by name would be answered twice.
+  /// Reserves the name of a server in a domain for the lifetime of the lock. Refuses (kConflict) a
+  /// name that another server of this host has, since clients that ask for it would be answered
+  /// twice.
   [[nodiscard]] static Result<PortLock> take_name(std::uint32_t domain, const std::string& server);
   ~PortLock();
   PortLock(PortLock&& other) noexcept;

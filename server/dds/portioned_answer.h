@@ -4,8 +4,8 @@
 
 namespace trammel {
 
-/// An answer that is computed in portions. All of it comes from the one model that was taken at the
-/// beginning, and each item is the same whoever computes it beside which others.
+/// An answer that is computed in portions. All portions use the one model that was taken at the
+/// beginning. Each item is the same whichever worker computes it, together with any others.
 template <typename Reply>
 class PortionedAnswer {
  public:

@@ -12,9 +12,9 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kPosesTold = 20;  // of a request, as what is asked for lately
+constexpr std::size_t kPosesTold = 20;  // poses of a request that are kept as recent ones
 
-/// The pose as the model is asked for it; refuses what the cell's arm cannot do.
+/// The pose in the form of a question to the model; refuses joints that the cell's arm cannot have.
 Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subject& subject,
                                const std::string& where) {
   const Cell& cell = subject.served->model.cell();
@@ -68,7 +68,7 @@ Result<Handlers::Predictions> Handlers::begin(const wire::PredictErrorRequest& r
     auto pose = TRY(context_of(request.poses()[i], subject, fmt::format("joint vector {}", i + 1)));
     poses.push_back(std::move(pose));
   }
-  // The last ones stand for all.
+  // The last poses represent all.
   const std::size_t told = std::min<std::size_t>(poses.size(), kPosesTold);
   for (std::size_t i = poses.size() - told; i < poses.size(); ++i)
     trainer_.recent_poses().add(request.about().cell(), poses[i]);

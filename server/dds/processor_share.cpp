@@ -25,8 +25,8 @@ struct Opened {
   Opened& operator=(const Opened&) = delete;
 };
 
-/// Calls `use` with the name of each entry of a folder, `.` and `..` too. readdir() would take
-/// memory from the heap.
+/// Calls `use` with the name of each entry of a folder, including `.` and `..`. readdir() would
+/// allocate heap memory.
 template <typename Use>
 void for_each_entry(const char* folder, const Use& use) {
   const Opened opened(folder, O_DIRECTORY);
@@ -63,7 +63,7 @@ ProcessorShare::Times ProcessorShare::now() {
 double ProcessorShare::since_last() {
   const Times before = last_;
   last_ = now();
-  // A thread that has ended takes its times along.
+  // The times of a thread that has ended are lost, so a sum can fall.
   const std::uint64_t ran = last_.ran - std::min(last_.ran, before.ran);
   const std::uint64_t queued = last_.queued - std::min(last_.queued, before.queued);
   if (queued == 0) return 1;

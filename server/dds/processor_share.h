@@ -4,17 +4,17 @@
 
 namespace trammel {
 
-/// The share that this process was given of the processor time that it wanted. On a crowded machine
-/// its threads stand in a queue; time that passes there says nothing of whether they hang. A thread
-/// that waits for a lock, or for news, wants none. Uses no heap and no lock, so that a thread that
-/// watches others may ask. Not thread-safe.
+/// The share of the processor time that this process wanted and got. On a crowded machine its
+/// threads wait for a processor, and that time is no sign of a hang. A thread that waits for a
+/// lock, or for news, wants no processor time. Uses no heap and no lock, so that a watching thread
+/// may call it. Not thread-safe.
 class ProcessorShare {
  public:
   static constexpr double kLeast = 0.25;
 
   ProcessorShare() { static_cast<void>(since_last()); }
 
-  /// kLeast to 1, since the last call; 1 also where the system does not tell.
+  /// kLeast to 1, since the last call; also 1 if the system does not report it.
   [[nodiscard]] double since_last();
 
  private:

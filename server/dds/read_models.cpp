@@ -32,7 +32,7 @@ Result<ReadModelsReply> list_of(const Result<std::vector<StoredBatch>>& batches)
   return reply;
 }
 
-/// The record that the store has of a cell's checks, and of how its model in force was judged.
+/// The store's record of a cell's checks, and of the verdict on its model in force.
 Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry,
                              const std::string& cell, std::int64_t since, std::size_t most) {
   const auto checks = TRY(store.health_checks(cell, std::max<std::int64_t>(since, 0), most));
@@ -57,7 +57,7 @@ Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry,
   return health;
 }
 
-/// The servers of the record; null while nobody can say.
+/// The servers of the record; null while they are unknown.
 nlohmann::ordered_json servers_of(const Trainer& trainer) {
   const auto servers = trainer.servers();
   return servers ? servers_json(*servers) : nlohmann::ordered_json(nullptr);

@@ -7,7 +7,7 @@ namespace trammel {
 namespace {
 
 constexpr const char* kNowhere = "trammel.nobody";  // a partition
-/// Longer than a lease: whoever died when the last one left has been noticed.
+/// Longer than a lease, so that a client that died with the last departure has been noticed.
 constexpr auto kQuiet = 2 * wire::kLease;
 constexpr std::size_t kKept = 8;         // for the next clients, when all is quiet
 constexpr std::size_t kMostKept = 1024;  // also when it never is
@@ -88,7 +88,7 @@ void ParkedChannels::park(Channel channel, Time now) {
   last_parked_ = now;
   if (channel->publisher() == nullptr) return;
   if (channel->has_readers() && !channel->move_to(kNowhere))
-    return;  // its client has not left, but gets no replies
+    return;  // its client is still there, but gets no replies
   parked_.push_back(std::move(channel));
 }
 

@@ -14,7 +14,7 @@
 
 namespace trammel {
 
-/// Makes of a reply that cannot be written the answer that says so.
+/// Makes an error reply in place of one that cannot be written.
 using InsteadOf = std::function<std::shared_ptr<void>(const void* reply)>;
 
 /// A writer of one reply topic to one client.
@@ -30,8 +30,8 @@ class ReplyWriter final : private wire::dds::DataWriterListener {
   ReplyWriter& operator=(const ReplyWriter&) = delete;
 
   [[nodiscard]] bool has_reader() const { return readers_ > 0; }
-  /// Does not wait for the reader: what it does not take in time is overwritten. A reply that does
-  /// not fit on the wire is replaced by an error. False: nothing was written.
+  /// Does not wait for the reader: samples that it does not take in time are overwritten. A reply
+  /// that does not fit on the wire is replaced by an error. False: nothing was written.
   [[nodiscard]] bool write(void* reply);
 
  private:
@@ -74,24 +74,24 @@ class ReplyChannel {
   std::map<std::string, Writer> writers_;  // by topic
 };
 
-/// The channels of clients that have left, kept for others. Deleting a writer tells all clients so,
-/// and the library removes that news from its history when the last of them has heard it. If the
-/// last one is dead, that happens as its lease ends, and may meet the thread that sends old news to
-/// a newcomer: each then holds the lock that the other wants, for ever. So while clients come and
-/// go a channel moves to the next client, and the rest is deleted when nobody has left for a while.
-/// Other libraries than Fast DDS do not follow a writer to another partition: their clients get new
-/// channels. Whoever comes again under its name gets its own one: its readers are matched with
-/// those writers as soon as it hears of them, and what another writer sends meanwhile they do not
-/// hear. Not thread-safe.
+/// The channels of clients that have left, kept for others. Deleting a writer notifies all clients,
+/// and the library removes that notice from its history when the last of them has confirmed it. If
+/// the last one is dead, this happens when its lease ends. It may then coincide with the thread
+/// that sends old notices to a newcomer: each holds the lock that the other needs, a deadlock. So
+/// while clients come and go, a channel moves to the next client, and the rest is deleted when
+/// nobody has left for a while. Libraries other than Fast DDS do not follow a writer to another
+/// partition, so their clients get new channels. A client that returns under its name gets its own
+/// channel: its readers match those writers as soon as it discovers them, and would miss samples of
+/// other writers meanwhile. Not thread-safe.
 class ParkedChannels {
  public:
   using Time = std::chrono::steady_clock::time_point;
   using Channel = std::shared_ptr<ReplyChannel>;
 
   void park(Channel channel, Time now);
-  /// A channel for the client with this participant id; null: make one.
+  /// A channel for the client with this participant id; null: the caller makes one.
   [[nodiscard]] Channel take(const std::string& participant, const std::string& partition);
-  /// Deletes what has not been needed, a few at a time. True if there is more to delete.
+  /// Deletes unneeded channels, a few at a time. True if there are more to delete.
   bool tend(Time now);
   [[nodiscard]] std::size_t size() const { return parked_.size(); }
 

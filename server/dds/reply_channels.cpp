@@ -13,7 +13,7 @@ using Clock = std::chrono::steady_clock;
 
 /// A channel that was opened or used so lately is not given to another client.
 constexpr auto kGrace = 5 * wire::kAnnouncement;
-constexpr std::chrono::milliseconds kLook{500};  // for what is kept too long
+constexpr std::chrono::milliseconds kLook{500};  // period of the search for expired replies
 constexpr std::size_t kWrittenAtOnce = 64;
 
 OutboxLimits limits_of_kept() {

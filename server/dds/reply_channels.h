@@ -23,21 +23,20 @@
 
 namespace trammel {
 
-/// The reply channels: a publisher in the partition of each client, and a writer for each topic
-/// that it listens to. They are made when discovery finds the client's readers, and only then;
-/// ChannelBook says who has one. A reply to a reader that is not matched yet waits in an outbox,
-/// for a bounded time. Thread-safe.
+/// The reply channels: a publisher in the partition of each client, and a writer for each topic to
+/// which it listens. They are made when discovery finds the client's readers; ChannelBook decides
+/// which clients have one. A reply to a reader that is not matched yet waits in an outbox, for a
+/// limited time. Thread-safe.
 class ReplyChannels final : public ReplySink {
  public:
-  /// `wants_tending`: called when tend() has something to do. `writing` watches over what is
-  /// written.
+  /// `wants_tending`: called when tend() has work. `writing` supervises the written samples.
   ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity,
                 std::function<void()> wants_tending, WorkUnderWay& writing);
 
-  /// Adds a topic of replies, and what is answered `instead` of one that cannot be written. Call it
+  /// Adds a topic of replies, and the error `instead` of a reply that cannot be written. Call it
   /// before any other function.
   void add_topic(wire::dds::Topic* topic, InsteadOf instead);
-  /// Takes in what discovery has found since.
+  /// Processes the new events of discovery.
   void heard(const std::vector<ReaderEvent>& events);
   /// Opens and closes channels. Call it from one thread only. True while clients wait for a
   /// channel.
@@ -63,11 +62,10 @@ class ReplyChannels final : public ReplySink {
   /// Writes the reply, or keeps it until the client's reader is matched.
   void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override;
   void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override;
-  /// Writes what was posted, and what was kept once its reader is matched, until `stop`.
+  /// Writes posted replies, and kept ones once their reader is matched, until `stop`.
   void deliver(const std::stop_token& stop);
 
-  /// The number of times that deliver() has looked; it does at least twice a second. For the
-  /// watchdog: takes no lock.
+  /// The number of rounds of deliver(), at least two per second. For the watchdog: takes no lock.
   [[nodiscard]] std::uint64_t looks() const { return looks_; }
   /// Replies that were dropped because nobody listened.
   [[nodiscard]] std::uint64_t unheard() const { return unheard_; }

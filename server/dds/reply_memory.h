@@ -18,7 +18,7 @@ template <typename Reply>
 class ReplyMemory {
  public:
   struct Kept {
-    wire::ContentId asked;  ///< what was asked for under this id
+    wire::ContentId asked;  ///< the content of the request under this id
     Reply reply;
   };
   explicit ReplyMemory(std::size_t capacity) : capacity_(capacity) {}
@@ -47,8 +47,8 @@ class ReplyMemory {
   std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
-/// The requests that are being answered, so that a repeat is not carried out beside them: it gets
-/// the same answer once more. Thread-safe.
+/// The requests that are being answered. A repeat of one is not carried out again: the same answer
+/// is sent once more. Thread-safe.
 class UnderWay {
   enum class Stand { kFirst, kRepeat, kOther };
 
@@ -63,12 +63,13 @@ class UnderWay {
     }
     Piece(const Piece&) = delete;
     Piece& operator=(const Piece&) = delete;
-    /// False: it is being answered already, and will be once more for this repeat.
+    /// False: the request is being answered already, and the answer will be sent again for this
+    /// repeat.
     [[nodiscard]] bool is_first() const { return stand_ == Stand::kFirst; }
-    /// Something else is being answered under the same id.
+    /// True if another request is being answered under the same id.
     [[nodiscard]] bool is_other() const { return stand_ == Stand::kOther; }
-    /// For the first: true if a repeat has come that has no answer yet; it counts as answered then.
-    /// False is the end.
+    /// For the first request: true if a repeat without an answer has come; it then counts as
+    /// answered. After false no more repeats are accepted.
     [[nodiscard]] bool has_repeat() { return all_.take_repeat(request_); }
 
    private:

@@ -12,14 +12,14 @@ namespace trammel {
 /// announcements, or never.
 inline constexpr auto kReplyPatience = wire::kLease;
 
-/// Where a reply goes.
+/// The destination of a reply.
 struct ReplyAddress {
-  std::string participant;  ///< that sent the request
-  std::string partition;    ///< where it listens, as it says
+  std::string participant;  ///< the participant that sent the request
+  std::string partition;    ///< the partition in which it says it listens
   std::string topic;
 };
 
-/// Takes replies. Never waits for whoever reads them. Thread-safe.
+/// Takes replies. Never waits for the reader. Thread-safe.
 class ReplySink {
  public:
   virtual ~ReplySink() = default;

@@ -28,14 +28,14 @@ namespace trammel {
 /// The counts that all operations of a service keep.
 struct CallCounts {
   std::atomic<std::uint64_t> requests{0};  ///< answered by a handler or from memory
-  std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
-  std::atomic<std::uint64_t> shed{0};  ///< answered with RESULT_BUSY: there was no time or no room
-  std::atomic<std::uint64_t> lost{0};  ///< by a DDS reader, before anybody saw them
-  /// Not answered: another client listens where the reply was to go.
+  std::atomic<std::uint64_t> refused{0};   ///< those with a code other than RESULT_OK
+  std::atomic<std::uint64_t> shed{0};      ///< answered with RESULT_BUSY, for lack of time or room
+  std::atomic<std::uint64_t> lost{0};      ///< lost by a DDS reader, before the service saw them
+  /// Not answered, since another client listens in the reply's partition.
   std::atomic<std::uint64_t> misdirected{0};
 };
 
-/// The fault of a request that claims to be of another DDS writer than the one that sent it.
+/// The fault of a request that names another DDS writer than its sender.
 [[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(
     const wire::RequestHeader& header, const eprosima::fastrtps::rtps::GUID_t& writer) {
   if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
@@ -47,7 +47,7 @@ struct CallCounts {
                      {}};
 }
 
-/// The fault of a request whose id was given to something else before.
+/// The fault of a request whose id was used for another request.
 inline const wire::Fault kIdIsUsed{
     wire::RESULT_CONFLICT, "request_id is that of another request", {}, "request_id", {}, {}};
 
@@ -64,7 +64,7 @@ template <typename Operation>
 struct CallContext {
   using Reply = typename Operation::Reply::type;
   static constexpr std::size_t kRepliesRemembered = 1024;
-  static constexpr std::size_t kLately = 32;  // kept replies; those with many targets are large
+  static constexpr std::size_t kLately = 32;  // kept replies; replies with many targets are large
 
   std::string server_id;
   std::string reply_topic;
@@ -72,11 +72,11 @@ struct CallContext {
   ReplySink& replies;
   CallCounts& counts;
   ReplyMemory<Reply> memory{
-      kRepliesRemembered};             ///< of operations that change something, by request id
+      kRepliesRemembered};             ///< for operations that make changes, by request id
   ReplyMemory<Reply> lately{kLately};  ///< of long computations, by writer and request id
   UnderWay under_way = {};
   RequestRecorder* recorder = nullptr;
-  CallListener listener = {};  ///< told of what was to change something, and of what was refused
+  CallListener listener = {};  ///< receives requests for changes, and refused ones
   OperationCounts operation = {};
 };
 
@@ -100,12 +100,12 @@ class Call final : public Job {
         while_under_way_(std::move(while_under_way)),
         answering_(context.under_way, sent, request_->content) {}
 
-  /// False: a repeat of a request that is not answered yet. That one's answer is sent once more for
-  /// it.
+  /// False: a repeat of a request that is still being answered. The answer of the first is sent
+  /// once more for it.
   [[nodiscard]] bool is_first() const { return answering_.is_first(); }
 
-  /// Instead of begin(), where something else is being answered under its id: what was answered
-  /// under it before is repeated, all else is refused. True: it is answered so.
+  /// Replaces begin() if another request with the same id is being answered: a repeat gets the
+  /// earlier answer, anything else is refused. True: it was answered in this way.
   [[nodiscard]] bool is_answered_for_its_id() {
     if (!answering_.is_other()) return false;
     if (!find_known()) refuse(kIdIsUsed);

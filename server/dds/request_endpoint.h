@@ -37,7 +37,7 @@ struct ServiceCore {
   WorkUnderWay taking{};  ///< takes of requests from DDS readers
 };
 
-/// Where the requests of an operation queue: those that change something, and those that only read.
+/// The queues for requests of an operation: one for changes and one for reading.
 struct Lanes {
   Lane& changes;
   Lane& reads;
@@ -51,11 +51,11 @@ class RequestEndpointBase {
   [[nodiscard]] virtual OperationFigures figures() const = 0;
 };
 
-/// The facts that the schedule must know of a request of this participant.
+/// The facts about a request of this participant that the schedule needs.
 template <typename Operation, typename Request>
 [[nodiscard]] Ask ask_of(const Trainer& trainer, const Request& request,
                          const std::string& participant) {
-  /// The time that a request waits for its turn if its client does not say how long it waits.
+  /// The waiting time of a request whose client does not state one.
   constexpr std::chrono::milliseconds kPatience{5000};
   const std::string& cell = request.about().cell();
   const bool is_served = trainer.cells().contains(cell);
@@ -73,7 +73,7 @@ template <typename Operation, typename Request>
 }
 
 /// One operation and its DDS reader. The DDS listener takes each request out of the reader at once,
-/// so that none is pushed out by others, and queues it or has it answered RESULT_BUSY.
+/// so that others cannot push it out, and queues it or has it answered RESULT_BUSY.
 template <typename Operation>
 class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
  public:

@@ -6,8 +6,7 @@
 
 #include "idl/topics.h"
 
-/// The figures that the schedule is told of a request: how much it asks for, and how much memory it
-/// takes.
+/// The size of a request for the schedule: its number of items, and its memory.
 namespace trammel {
 
 template <typename Request>
@@ -39,10 +38,10 @@ template <typename Request>
   }
 }
 
-/// Bytes that a request takes in memory until it is answered, about.
+/// The approximate memory of a request until it is answered, bytes.
 template <typename Request>
 [[nodiscard]] std::size_t bytes_of_request(const Request& request) {
-  constexpr std::size_t kAskedAndAnswered = 1024;  // of one item
+  constexpr std::size_t kAskedAndAnswered = 1024;  // bytes per item, for question and answer
   std::size_t bytes = sizeof(Request) + kAskedAndAnswered * items_of(request);
   if constexpr (requires { request.bytes; }) bytes += request.bytes;  // serialized
   return bytes;
@@ -51,7 +50,7 @@ template <typename Request>
 /// Bytes that a reply takes in memory, about.
 template <typename Reply>
 [[nodiscard]] std::size_t bytes_of_reply(const Reply& reply) {
-  constexpr std::size_t kAnswered = 512;  // of one item
+  constexpr std::size_t kAnswered = 512;  // bytes per item, for the answer
   std::size_t bytes = sizeof(Reply) + reply.header().message().size();
   if constexpr (requires { reply.corrections(); }) bytes += kAnswered * reply.corrections().size();
   if constexpr (requires { reply.predictions(); }) bytes += kAnswered * reply.predictions().size();
@@ -62,9 +61,9 @@ template <typename Reply>
   return bytes;
 }
 
-/// Whose changes come one after the other: those of a cell. To read a model that is imported takes
-/// seconds and changes nothing yet: the cell does not wait for it, and imports come one at a time,
-/// for the memory.
+/// The key of changes that run one after the other: the cell. Reading an imported model takes
+/// seconds and changes nothing yet, so the cell does not wait for it. Imports run one at a time
+/// because of their memory.
 template <typename Request>
 [[nodiscard]] std::string turn_of(const Request& request, const std::string& cell) {
   if constexpr (requires { request.model_text(); }) {
@@ -73,7 +72,7 @@ template <typename Request>
   return cell;
 }
 
-/// Requests that cost alike: of one cell, with the same action.
+/// The key of requests with similar costs: the cell, and the action.
 template <typename Request>
 [[nodiscard]] std::string work_of(const Request& request, const std::string& cell,
                                   const char* operation) {

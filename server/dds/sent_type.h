@@ -4,8 +4,8 @@
 
 namespace trammel {
 
-/// The type of replies on the side of the server. What a client would drop is not written, so that
-/// the server can answer otherwise.
+/// The type of replies on the server's side. A reply that a client would drop is not written, so
+/// that the server can send an error instead.
 template <typename PubSubType>
 class SentType final : public wire::SafeType<PubSubType> {
  public:

@@ -8,10 +8,10 @@
 namespace trammel {
 namespace {
 
-/// Limit of readers noted between two calls of wait(); they are some milliseconds apart.
+/// Limit of readers recorded between two calls of wait(), which are some milliseconds apart.
 constexpr std::size_t kMaxReaders = 4096;
 
-/// Who the participant says that it is; empty: it does not say.
+/// The name that the participant claims; empty: it claims none.
 std::string claimed_subject(const eprosima::fastrtps::rtps::IdentityToken& token) {
   for (const auto& property : token.properties()) {
     if (property.name() == "dds.cert.sn") return property.value();
@@ -19,7 +19,7 @@ std::string claimed_subject(const eprosima::fastrtps::rtps::IdentityToken& token
   return {};
 }
 
-/// Where the participant says that it can be reached; empty: it does not say.
+/// The address that the participant announces; empty: it announces none.
 std::string claimed_address(const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
   for (const auto* locators :
        {&participant.metatraffic_locators.unicast, &participant.default_locators.unicast}) {

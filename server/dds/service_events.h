@@ -16,16 +16,16 @@
 
 namespace trammel {
 
-/// A change of a client that discovery has found. If a participant has left, only the participant
-/// is told.
+/// A change of a client that discovery has found. For a participant that has left, only
+/// `participant` is set.
 struct ReaderEvent {
   enum class Kind { kFound, kLost, kLeft } kind;
   ReplyReader reader;
 };
 
-/// The events for which the status thread of a service waits. As the participant's listener it
-/// notes the readers of replies, and the participants that have left, and the names of those that
-/// were let in. Thread-safe.
+/// The events for which the status thread of a service waits. As the participant's listener, it
+/// records the readers of replies, the participants that have left, and the names of the admitted
+/// ones. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
   /// The status is to be published.

@@ -16,7 +16,7 @@ namespace trammel {
 class StatusEcho final : private wire::dds::DataReaderListener {
  public:
   /// `writer` is the server's writer of ServiceStatus in `participant`. `heard` belongs to that
-  /// participant; it is told to drop the first copy of each sample of `writer`.
+  /// participant; it is asked to drop the first copy of each sample of `writer`.
   [[nodiscard]] static Result<std::unique_ptr<StatusEcho>> open(
       wire::dds::DomainParticipant& participant, wire::dds::Subscriber& subscriber,
       const wire::dds::DataWriter& writer, wire::HeardOfItself& heard);

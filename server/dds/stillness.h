@@ -17,10 +17,10 @@ struct MovingPart {
   /// A number that changes with every piece of work done; empty while there is no work. Never
   /// waits.
   std::function<std::optional<std::uint64_t>()> mark;
-  bool ends_process = true;  ///< false: its stillness is told and nothing more
+  bool ends_process = true;  ///< false: the watchdog only reports its stillness
 };
 
-/// Tells which parts, 64 at most, have stopped. A look may come late because the process was
+/// Finds the parts, 64 at most, that have stopped. A look may come late because the process was
 /// stopped or the machine was busy. A late look counts as one tick only, so that such pauses do not
 /// look like a hang. Not thread-safe.
 class Stillness {
@@ -33,8 +33,8 @@ class Stillness {
   /// Returns the names of the parts that have stopped. `since_last` is the time since the last
   /// look, by a steady clock.
   [[nodiscard]] std::vector<const char*> look(Duration since_last);
-  /// Those that had not moved for `time` at the last look, a bit each, in their order; also those
-  /// that end nothing.
+  /// The parts that had not moved for `time` at the last look, a bit each, in their order; parts
+  /// that do not end the process are included.
   [[nodiscard]] std::uint64_t still_for(Duration time) const;
 
  private:
@@ -47,7 +47,7 @@ class Stillness {
   Duration tick_, limit_;
 };
 
-/// The pieces of work that are under way. Each is short: one that stays long hangs. Thread-safe,
+/// The pieces of work under way. Each piece is short: one that lasts long hangs. Thread-safe,
 /// without a lock.
 class WorkUnderWay {
  public:

@@ -7,7 +7,7 @@
 namespace trammel {
 namespace {
 
-/// Refuses what a training of each kind is not told.
+/// Refuses parameters that do not belong to this kind of training.
 Status check_training(const wire::TrainRequest& request) {
   if (request.kind() == wire::TRAIN_BATCHES) {
     if (request.csv().empty()) return {};

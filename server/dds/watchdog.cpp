@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Formats without the heap: its lock may be held by the thread that hangs.
+/// Formats without the heap, because the hanging thread may hold the heap's lock.
 [[noreturn]] void end_hung(const std::vector<const char*>& stopped) {
   std::array<char, 256> names{};
   for (const char* name : stopped) {

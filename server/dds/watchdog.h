@@ -13,17 +13,16 @@
 
 namespace trammel {
 
-/// Exit code of a process that ends because it hangs. A restart may help.
+/// Exit code of a process that hangs. A restart may help.
 inline constexpr int kExitHung = 70;
 
-/// Writes `line` to standard error if that needs no waiting, and ends the process at once. Runs no
-/// destructor and takes no lock: the thread that hangs may hold any lock.
+/// Writes `line` to standard error if that is possible without waiting, and ends the process at
+/// once. Runs no destructor and takes no lock: the thread that hangs may hold any lock.
 [[noreturn]] void end_at_once(const char* line);
 
-/// Ends the process when one of `parts` stops moving. Time counts only as far as the process was
-/// given the processor: one that is slow on a crowded machine does not hang. A daemon that has
-/// ended is started again by its supervisor; one that hangs is not. Checks from its own thread
-/// until it is destroyed.
+/// Ends the process when one of `parts` stops moving. Time counts only while the process had a
+/// processor: a process that is slow on a crowded machine does not hang. A supervisor restarts a
+/// daemon that has ended, but not one that hangs. Checks from its own thread until it is destroyed.
 class Watchdog {
  public:
   static constexpr std::chrono::milliseconds kTick{250};
@@ -35,8 +34,8 @@ class Watchdog {
 
   explicit Watchdog(std::vector<MovingPart> parts);
 
-  /// The parts that have not moved for kLong; `watchdog` where it has not looked itself for as
-  /// long. Takes no lock.
+  /// The parts that have not moved for kLong; `watchdog` if the watchdog itself has not looked for
+  /// as long. Takes no lock.
   [[nodiscard]] std::vector<std::string> still() const;
 
  private:

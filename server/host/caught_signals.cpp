@@ -19,7 +19,7 @@ namespace {
 constexpr std::array kCaught = {SIGTERM, SIGINT, SIGHUP};
 constexpr std::chrono::milliseconds kOrderlyStop{10'000};
 constexpr std::chrono::milliseconds kTick{250};
-constexpr unsigned char kOver = 0;  // in the pipe: no signal, but the end of the object
+constexpr unsigned char kOver = 0;  // in the pipe: not a signal, but the end of the object
 
 std::atomic<int> pipe_to_write = -1;
 static_assert(std::atomic<int>::is_always_lock_free, "a signal handler reads it");
@@ -34,7 +34,7 @@ void write_number(unsigned char number) {
 
 void handle(int number) { write_number(static_cast<unsigned char>(number)); }
 
-/// `how`: SIG_BLOCK or SIG_UNBLOCK, in this thread and those that it starts.
+/// `how`: SIG_BLOCK or SIG_UNBLOCK, in this thread and in threads that it starts later.
 void mask(int how) {
   sigset_t caught;
   ::sigemptyset(&caught);
@@ -104,10 +104,10 @@ void CaughtSignals::note(int number) {
 
 void CaughtSignals::watch_the_end(const std::stop_token& over) const {
   pollfd readable{numbers_, POLLIN, 0};
-  // Counts ticks, not time: the process may be paused meanwhile, and that is no hang.
+  // Counts ticks, not time: a process that was paused meanwhile does not hang.
   for (auto waited = kTick; waited <= kOrderlyStop;) {
     if (::poll(&readable, 1, static_cast<int>(kTick.count())) == 0) waited += kTick;
-    unsigned char ignored = kOver;  // who asked once need not ask again
+    unsigned char ignored = kOver;  // further requests change nothing
     static_cast<void>(::read(numbers_, &ignored, 1));
     if (over.stop_requested()) return;
   }

@@ -12,12 +12,13 @@ namespace trammel {
 /// (SIGHUP).
 ///
 /// Libraries start threads before main() begins, and the kernel gives a signal to any thread that
-/// does not block it. So these signals have a handler: in whichever thread it runs, it writes the
-/// signal's number into a pipe and does nothing else. Threads that are started while one of these
-/// exists block the signals, so that none of their calls is interrupted. One exists at a time.
+/// does not block it. So these signals have a handler. In whichever thread it runs, it only writes
+/// the signal's number into a pipe. Threads started while such an object exists block the signals,
+/// so that none of their calls is interrupted. At most one object exists at a time.
 class CaughtSignals {
  public:
-  /// `hangs` is called where the process still runs 10 s after a signal to end; it does not return.
+  /// `hangs` is called if the process still runs 10 s after a termination signal; it does not
+  /// return.
   explicit CaughtSignals(std::function<void()> hangs);
   ~CaughtSignals();
   CaughtSignals(const CaughtSignals&) = delete;

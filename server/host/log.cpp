@@ -35,7 +35,7 @@ class PlainMessage final : public spdlog::custom_flag_formatter {
   }
 };
 
-/// Lines of the log to where nobody may read any more: the service does not wait for that.
+/// A sink for log lines whose reader may have stopped reading: the service does not wait for it.
 class LogSink final : public spdlog::sinks::sink {
  public:
   explicit LogSink(int descriptor) : output_(descriptor), is_terminal_(::isatty(descriptor) == 1) {}
@@ -75,7 +75,7 @@ class LogSink final : public spdlog::sinks::sink {
       std::make_unique<spdlog::pattern_formatter>();
 };
 
-/// The way in which lines are written, beside the logger.
+/// The format of lines and the limits, beside the logger.
 struct LogState {
   std::atomic<bool> json{false};
   Mutex mutex;
@@ -115,7 +115,8 @@ Status start_log(const LogOptions& options) {
   }
   spdlog::set_default_logger(
       std::make_shared<spdlog::logger>("trammeld", std::make_shared<LogSink>(descriptor)));
-  spdlog::set_error_handler([](const std::string&) {});  // it would wait for standard error
+  spdlog::set_error_handler([](const std::string&) {});  // the default handler would wait for
+                                                         // standard error
   spdlog::flush_on(spdlog::level::info);
   change_log(options);
   return {};

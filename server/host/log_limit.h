@@ -17,7 +17,7 @@ class LogLimit {
 
   struct Verdict {
     bool goes = true;
-    std::uint64_t left_out_before = 0;  ///< lines of this kind, since the last one that went
+    std::uint64_t left_out_before = 0;  ///< lines of this kind left out since the last one written
   };
   [[nodiscard]] Verdict look(std::string_view kind, Time now);
 

@@ -9,7 +9,7 @@
 namespace trammel {
 namespace {
 
-/// Its messages are for people; nothing here depends on whether it listens.
+/// Sends a message for people; nothing here depends on its delivery.
 void notify(const std::string& state) { static_cast<void>(::sd_notify(0, state.c_str())); }
 
 long long monotonic_us() {

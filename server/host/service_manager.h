@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-/// The messages to the manager of services (systemd) that started this process. Without one all of
-/// this does nothing. Thread-safe.
+/// The messages to the service manager (systemd) that started this process. Without one these
+/// functions do nothing. Thread-safe.
 namespace trammel {
 
 /// It serves; also at the end of a reload.

@@ -36,14 +36,14 @@ void send_away(int socket) {
   close_with_words(socket);
 }
 
-/// Whoever accepts a connection does with it what is to be done: that never waits.
+/// Runs the work for a connection in the accepting thread; the work never waits.
 class AtOnce final : public httplib::TaskQueue {
  public:
   void enqueue(std::function<void()> take) override { take(); }
   void shutdown() override {}
 };
 
-/// A bounded queue of connections whose request has come, and the threads that answer them.
+/// A bounded queue of connections with a complete request, and the threads that answer them.
 class Workers {
  public:
   using Serve = std::function<void(int socket)>;
@@ -95,8 +95,8 @@ class Workers {
   std::vector<std::jthread> workers_;
 };
 
-/// `127.0.0.1:9464` and `localhost` name this host; a name that somebody else's server may have
-/// given it does not.
+/// `127.0.0.1:9464` and `localhost` name this host; another name, even one that resolves to it,
+/// does not.
 bool is_of_this_host(const std::string& host) {
   const std::string name = host.substr(0, host.rfind(':'));
   in_addr parsed{};
@@ -105,7 +105,7 @@ bool is_of_this_host(const std::string& host) {
   return name == "localhost" || is_loopback;
 }
 
-/// The first word of the path that a request asks for.
+/// The first word of a request's path.
 std::string first_word(const std::string& head) {
   const std::size_t slash = head.find('/');
   if (slash == std::string::npos) return {};
@@ -161,12 +161,13 @@ class BoundedServer::Running final : public httplib::Server {
       apart_[word] =
           std::make_unique<Workers>(1, limits_.waiting, [this](int socket) { serve(socket); });
     new_task_queue = [] { return new AtOnce; };
-    // By itself it would share the port with whoever listens there.
+    // By default it would share the port with another listener.
     set_socket_options([](int socket) {
       const int yes = 1;
       ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
     });
-    // Before it looks for a route: those are regular expressions, which a long path makes too deep.
+    // Runs before the search for a route, whose regular expressions recurse too deep for a long
+    // path.
     set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
       HttpReply reply = reply_to(request, handler_);
       response.status = reply.code;
@@ -204,8 +205,8 @@ class BoundedServer::Running final : public httplib::Server {
   void serve(int socket) {
     DeadlineStream stream(socket, limits_.reading, limits_.writing);
     bool closed = false;
-    // One request a connection; neither compressed nor in pieces: that is work, and nobody is far
-    // away.
+    // One request per connection, neither compressed nor in pieces. Both would cost work, and all
+    // clients are on this host.
     process_request(stream, true, closed, [](httplib::Request& request) {
       request.headers.erase("Accept-Encoding");
       request.ranges.clear();

@@ -22,15 +22,15 @@ struct HttpLimits {
       {};  ///< first words of paths that have a worker of their own each
 };
 
-/// A server of HTTP/1.1 for GET and HEAD, one request a connection. A fixed number of threads of
-/// low priority, bounded queues, and a time for each request: whoever is slow to ask holds up
-/// nobody, whoever is slow to read others who read what has no worker of its own, and neither
-/// anything else of the process. It answers to names of this host only, so that no page of somebody
-/// else's can ask through a browser (DNS rebinding).
+/// A server of HTTP/1.1 for GET and HEAD, one request per connection. It has a fixed number of
+/// threads of low priority, bounded queues, and a time limit for each request. A client that sends
+/// slowly holds up nobody. A client that reads slowly holds up only other readers that share its
+/// workers. Neither affects the rest of the process. It answers to names of this host only, so that
+/// no foreign page can send requests through a browser (DNS rebinding).
 class BoundedServer {
  public:
   /// Listens until it is destroyed. `handler` is called in its threads. Refuses (kUsage) an address
-  /// that is not 127.x.x.x or that this host does not have, and (kConflict) a port that is taken.
+  /// that is not 127.x.x.x or that this host does not have, and (kConflict) an occupied port.
   [[nodiscard]] static Result<std::unique_ptr<BoundedServer>> start(const std::string& address,
                                                                     std::uint16_t port,
                                                                     const HttpLimits& limits,

@@ -12,7 +12,8 @@
 namespace trammel {
 namespace {
 
-/// Or the system would tell the other side that what it was sent is lost.
+/// Reads the rest of the input. Otherwise closing would reset the connection, and the other side
+/// would lose data sent to it.
 void read_what_is_left(int socket) {
   std::array<char, 4096> rest{};
   for (int i = 0; i < 16 && ::recv(socket, rest.data(), rest.size(), MSG_DONTWAIT) > 0; ++i)

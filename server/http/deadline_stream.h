@@ -38,10 +38,10 @@ class DeadlineStream final : public httplib::Stream {
   const std::chrono::milliseconds writing_;
   Clock::time_point write_until_{};  // set by the first byte written
   std::array<char, 4096> buffer_{};
-  std::size_t from_ = 0, to_ = 0;  // what of the buffer is not read yet
+  std::size_t from_ = 0, to_ = 0;  // the unread part of the buffer
 };
 
-/// Ends a connection so that the other side still reads what it was sent.
+/// Ends a connection so that the other side can still read the data sent to it.
 void close_with_words(int socket);
 
 }  // namespace trammel

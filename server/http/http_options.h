@@ -5,9 +5,9 @@
 
 namespace trammel {
 
-/// Where pages and metrics are served.
+/// The address of pages and metrics.
 struct HttpOptions {
-  std::string address = "127.0.0.1";  ///< of this host alone: 127.x.x.x
+  std::string address = "127.0.0.1";  ///< an address of this host only: 127.x.x.x
   std::uint16_t port = 0;             ///< TCP; 0: nothing is served
 };
 

@@ -32,7 +32,7 @@ struct Incoming::Head {
   std::string bytes;
 };
 
-// A connection that has ended has all that will ever come.
+// A connection that has ended sends nothing more.
 Incoming::Head Incoming::head_of(int socket) {
   std::string bytes(kLongestHead, '\0');
   const ssize_t size = ::recv(socket, bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT);
@@ -139,7 +139,7 @@ void Incoming::close_late() {
   const auto now = std::chrono::steady_clock::now();
   std::erase_if(slow_, [&](const Slow& one) {
     if (now - one.since < patience_) return false;
-    close_at_once(one.socket);  // which ends epoll's interest in it, too
+    close_at_once(one.socket);  // which also removes it from epoll
     return true;
   });
 }
@@ -148,7 +148,7 @@ void become_http_thread(const char* name) {
   constexpr int kNiceness = 10;
   ::pthread_setname_np(::pthread_self(), name);
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()),
-                kNiceness);  // of this thread alone, as Linux has it
+                kNiceness);  // this thread alone, which Linux allows
 }
 
 void Incoming::wake() const {

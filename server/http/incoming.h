@@ -12,17 +12,17 @@
 
 namespace trammel {
 
-/// Connections whose request has not come yet. They take no worker: one thread watches all of them,
-/// and hands on each whose request has its head. Whoever is slow can hold up nobody: where there is
-/// no room, the one that has been slow for longest makes it. Thread-safe.
+/// Connections whose request has not arrived yet. They occupy no worker: one thread watches all of
+/// them, and hands on each one whose request head is complete. A slow client holds up nobody: if
+/// there is no room, the slowest connection is closed. Thread-safe.
 class Incoming {
  public:
   using Come =
       std::function<void(int socket, const std::string& head)>;  ///< closes it, sooner or later
   using PushedOut = std::function<void(int socket)>;             ///< closes it
 
-  /// `come`: takes what can be read at once. `pushed_out`: takes what made room, and what waits at
-  /// the end.
+  /// `come`: takes a connection that can be read at once. `pushed_out`: takes connections that made
+  /// room, and those that still wait at the end.
   Incoming(std::size_t most, std::chrono::milliseconds patience, Come come, PushedOut pushed_out);
   ~Incoming();
   Incoming(const Incoming&) = delete;
@@ -39,7 +39,7 @@ class Incoming {
 
   struct Head;
   [[nodiscard]] static Head head_of(int socket);
-  /// Hands on a connection whose head is there, and closes one whose head is too long.
+  /// Hands on a connection with a complete head, and closes one whose head is too long.
   void take(int socket, const Head& head) const;
   void watch(const std::stop_token& stop);
   void look_at(int socket);

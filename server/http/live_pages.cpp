@@ -21,7 +21,7 @@ constexpr int kLiveAgain = 5;                 // s
 constexpr std::size_t kMostVersions = 100;    // of a cell's page
 constexpr std::size_t kHistoryVersions = 10;  // whose parameters are read
 constexpr std::size_t kEvents = 30;
-constexpr int kJobs = 20;  // of those done, and of those failed
+constexpr int kJobs = 20;  // listed finished jobs, and listed failed jobs
 
 std::string html_time(std::optional<std::int64_t> unix_s) {
   return "<time>" + shown_time(unix_s) + "</time>";
@@ -143,8 +143,7 @@ bool has_findings(const StoredJob& job) {
   return job.kind() != JobKind::kTrain && job.state == JobState::kDone;
 }
 
-/// `Last check, 2026-11-22: healthy`, with the way to what it found; empty where none was made
-/// lately.
+/// `Last check, 2026-11-22: healthy`, with a link to its findings; empty without a recent check.
 std::string last_of(const std::vector<StoredJob>& jobs, JobKind kind) {
   const StoredJob* last = nullptr;  // the jobs come oldest first
   for (const StoredJob& job : jobs)

@@ -9,11 +9,11 @@
 
 namespace trammel {
 
-/// All cells: whether each is answered for, with which model, how old that is.
+/// All cells: whether each is answered for, its model, and the model's age.
 [[nodiscard]] ServicePage fleet_page(const Watched& server);
-/// One cell: its model in force, its versions, jobs, batches that are kept out, what was changed.
+/// One cell: its model in force, its versions, jobs, quarantined batches, and changes.
 [[nodiscard]] Result<ServicePage> cell_page(const Watched& server, const std::string& cell);
-/// The jobs that wait or run, and the last ones that ended.
+/// The waiting and running jobs, and the last ended ones.
 [[nodiscard]] Result<ServicePage> jobs_page(const Watched& server);
 [[nodiscard]] Result<ServicePage> job_page(const Watched& server, std::int64_t job);
 

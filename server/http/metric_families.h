@@ -13,13 +13,13 @@ namespace trammel {
 
 using MetricLabels = std::vector<std::pair<const char*, std::string>>;
 
-/// Collects metrics in the order in which they are told.
+/// Collects metrics in the order in which they are added.
 class MetricFamilies {
  public:
   void gauge(const char* name, const char* help, double value, const MetricLabels& labels = {});
   void counter(const char* name, const char* help, double value, const MetricLabels& labels = {});
-  /// `in_class`: how many are in each class, `bounds` their upper bounds; one more class holds what
-  /// is above the last.
+  /// `in_class`: the count of each class; `bounds`: their upper bounds. One more class has the
+  /// values above the last bound.
   void histogram(const char* name, const char* help, std::span<const double> bounds,
                  std::span<const std::uint64_t> in_class, double sum,
                  const MetricLabels& labels = {});

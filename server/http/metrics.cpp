@@ -82,7 +82,8 @@ void add_work(MetricFamilies& out, const std::map<std::string, WorkFigures>& wor
   }
 }
 
-/// `geometry, iteration 4` without what changes all the time: each value is a series of its own.
+/// `geometry, iteration 4` without its changing numbers, since each value makes a series of its
+/// own.
 std::string phase_of(const JobProgress& job) {
   const std::string phase = job.what.substr(0, job.what.find_first_of(",0123456789:"));
   const auto last = phase.find_last_not_of(' ');

@@ -18,8 +18,8 @@ class Metrics {
 
   /// A job is over; others are not counted.
   void job_changed(const JobProgress& job);
-  /// In Prometheus' text format. `shed`: requests for pages that were sent away. Of a server that
-  /// does not serve, the process alone.
+  /// The figures in Prometheus' text format. `shed`: requests for pages that were rejected. Before
+  /// it serves, only those of the process.
   [[nodiscard]] std::string text(ServerPhase phase, std::uint64_t shed);
 
  private:
@@ -29,8 +29,8 @@ class Metrics {
     std::int64_t trained_at = 0;
     std::optional<std::int64_t> measured_at;
   };
-  /// The stamps of each cell's model in force, as far as they are known; learns those that are in
-  /// memory, and asks the store about a few others.
+  /// The stamps of each cell's model in force, as far as they are known. It learns those of models
+  /// in memory, and asks the store about a few others.
   [[nodiscard]] std::map<std::string, Stamp> stamps();
 
   const Watched& server_;

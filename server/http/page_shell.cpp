@@ -43,8 +43,8 @@ std::string way_back(const std::string& cell) {
   return "<nav class=\"service\">" + links + "</nav>";
 }
 
-/// Puts `what` before or behind the first `mark`; the page's own head and body come before all that
-/// is foreign.
+/// Puts `what` before or behind the first `mark`; the page's own head and body come before all
+/// foreign text.
 std::string inserted(std::string page, std::string_view mark, const std::string& what,
                      bool behind) {
   const std::size_t at = page.find(mark);

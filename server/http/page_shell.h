@@ -17,10 +17,10 @@ struct ServicePage {
 };
 [[nodiscard]] HttpReply page_reply(const ServicePage& page, int code = 200);
 
-/// A page that stands for itself (a model, a history), with the way back to the others above it.
+/// A separate page (a model, a history), with links to the other pages above it.
 [[nodiscard]] HttpReply report_reply(const std::string& page, const std::string& cell);
-/// report_reply() of a page that an earlier version of the program may have written: its scripts
-/// run, shut off from everything else.
+/// report_reply() for a page that an earlier version of the program may have written. Its scripts
+/// run, but without access to anything else.
 [[nodiscard]] HttpReply stored_page_reply(const std::string& page, const std::string& cell);
 
 /// The page of a cell, whatever its name is.

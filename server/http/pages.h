@@ -13,8 +13,8 @@
 
 namespace trammel {
 
-/// The pages for people: the fleet, a cell, its models, jobs, what they found. Costly ones are made
-/// one at a time, and the last ones made are kept for a moment. Thread-safe.
+/// The pages for people: the fleet, a cell, its models, jobs and their findings. Costly pages are
+/// made one at a time, and the latest ones are cached for a moment. Thread-safe.
 class Pages {
  public:
   explicit Pages(const Watched& server) : server_(server) {}
@@ -30,7 +30,7 @@ class Pages {
   };
   [[nodiscard]] HttpReply of_cell(const HttpAsk& ask);
   [[nodiscard]] HttpReply of_job(const HttpAsk& ask);
-  /// The reply of this address that is kept, or a new one.
+  /// The cached reply for this address, or a new one.
   [[nodiscard]] HttpReply kept(const std::string& address, std::chrono::seconds keep,
                                const std::function<HttpReply()>& make);
   [[nodiscard]] std::optional<HttpReply> find_kept(const std::string& address);

@@ -5,8 +5,8 @@
 
 namespace trammel {
 
-/// The system's figures of this process, and of the disk that the store is on. A figure that it
-/// does not tell is 0.
+/// The system's figures of this process, and of the disk with the store. A figure that the system
+/// does not provide is 0.
 struct ProcessFigures {
   double resident_bytes = 0;
   double processor_s = 0;
@@ -19,7 +19,7 @@ struct ProcessFigures {
 struct StoreFileFigures {
   double bytes = 0;
   double journal_bytes = 0;  ///< of the write-ahead log
-  double free_bytes = 0;     ///< of the disk, for this process
+  double free_bytes = 0;     ///< of the disk, available to this process
 };
 [[nodiscard]] StoreFileFigures store_file_figures(const std::string& path);
 

@@ -10,7 +10,7 @@ using State = CellReadiness::State;
 using Where = ModelRegistry::Place::Where;
 
 constexpr int kMostCellsAsked =
-    20;  // dark cells whose last training the store is asked for, in one answer
+    20;  // dark cells whose last training the store looks up, per answer
 
 /// The values in which all cells are looked up, read once.
 struct Known {
@@ -51,7 +51,7 @@ State state_at(Where where) {
   return where == Where::kComes ? State::kLoading : State::kOnDisk;
 }
 
-/// The readiness of a cell that never had a model in force, as far as its last training tells.
+/// The readiness of a cell that never had a model in force, by its last training.
 CellReadiness untrained(const std::string& cell, const Watched& server, int* asked) {
   CellReadiness one{cell, State::kUntrained, 0, "there is no model: submit a batch"};
   if (++*asked > kMostCellsAsked) return one;
@@ -83,7 +83,7 @@ CellReadiness readiness_of(const std::string& cell, const Known& known, const Wa
       trouble != known.troubles.end() && state_of(trouble->second) == State::kFormerServed;
   if (has_other_files)
     return {cell, State::kDescribedOtherwise, 0,
-            trouble->second.what};  // and no model to go on with
+            trouble->second.what};  // and no model to continue with
   if (trouble != known.troubles.end())
     return {cell, state_of(trouble->second), 0, trouble->second.what};
   if (const auto job = known.unfinished.find(cell); job != known.unfinished.end())
@@ -92,7 +92,7 @@ CellReadiness readiness_of(const std::string& cell, const Known& known, const Wa
   return untrained(cell, server, asked);
 }
 
-/// Notes on what does not stop it from answering.
+/// Notes on troubles that do not stop it from answering.
 std::vector<std::string> notes_of(const Watched& server) {
   std::vector<std::string> notes;
   const StoreState state = server.store.state();

@@ -8,13 +8,13 @@
 
 namespace trammel {
 
-/// Tells whether a cell is answered for, and if not, why. README.md of this folder has the table.
+/// Whether a cell is answered for, and if not, why. README.md of this folder has the table.
 struct CellReadiness {
   enum class State {
     kServed,
-    kOnDisk,         ///< served; its model is loaded when it is asked for
+    kOnDisk,         ///< served; a request loads its model
     kCopyServed,     ///< served, from the copy of a model whose text in the store is bad
-    kFormerServed,   ///< served, by files of the cell that the record no longer goes by
+    kFormerServed,   ///< served with files of the cell that the record no longer uses
     kOlderServed,    ///< served, with an older version than the one in force
     kLoading,        ///< dark: its model is not loaded yet
     kUntrained,      ///< dark: there is no model
@@ -42,7 +42,7 @@ struct Readiness {
   bool ready = false;
   nlohmann::ordered_json told;
 };
-/// `cell`: of this one alone; empty: of all.
+/// `cell`: this one only; empty: all.
 [[nodiscard]] Readiness readiness(const Watched& server, ServerPhase phase,
                                   const std::string& cell);
 

@@ -82,7 +82,7 @@ std::string versions_text(const CellOfFleet& cell) {
   return text.empty() ? "nobody" : text;
 }
 
-/// Cells of this server have a page here.
+/// The name of a cell, with a link if this server has a page of it.
 std::string cell_name(const Watched& server, const std::string& cell) {
   return server.trainer.cells().contains(cell) ? html_link(cell_address(cell), cell)
                                                : html_text(cell);

@@ -5,8 +5,8 @@
 
 namespace trammel {
 
-/// The servers of the record, the cells that they serve and the jobs that are not over: one page,
-/// whichever server shows it.
+/// The servers of the record, the cells that they serve, and the unfinished jobs: one page, the
+/// same on every server.
 [[nodiscard]] ServicePage servers_page(const Watched& server);
 
 }  // namespace trammel

@@ -14,7 +14,7 @@ namespace trammel {
 /// The phase of a server's life. Only while it serves may its parts be asked from other threads.
 enum class ServerPhase { kStarting, kServing, kStopping };
 
-/// The server whose state is shown. Everything that is referred to outlives what shows it.
+/// The server whose state is shown. All references outlive their users.
 struct Watched {
   std::string server_id;
   std::string program_version;

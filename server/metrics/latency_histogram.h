@@ -13,7 +13,7 @@ namespace trammel {
 /// without a lock; add() costs some ten nanoseconds.
 class LatencyHistogram {
  public:
-  /// Upper bounds of the classes, s. One more class holds what is above the last.
+  /// Upper bounds of the classes, s. One more class has the values above the last bound.
   static constexpr std::array<double, 16> kBounds = {0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005,
                                                      0.01,   0.025,   0.05,   0.1,   0.25,   0.5,
                                                      1,      2.5,     5,      10};

@@ -15,9 +15,9 @@ namespace trammel {
 class OperationCounts {
  public:
   static constexpr std::size_t kResults =
-      32;  ///< result codes that are told apart; what is beyond counts as the last
+      32;  ///< result codes with a counter of their own; higher ones count as the last
 
-  /// A request was answered with this code, `times` times (with its repeats).
+  /// Counts a request with this result, `times` times (with its repeats).
   void answered(std::size_t result, std::uint64_t times) {
     by_result_[std::min(result, kResults - 1)].fetch_add(times, std::memory_order_relaxed);
   }

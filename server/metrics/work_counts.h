@@ -11,21 +11,21 @@
 
 namespace trammel {
 
-/// The requests to a cell, and how sure the answers were: they tell whether the work is where the
-/// model knows the arm.
+/// The requests to a cell, and the certainty of the answers. They show whether the work is where
+/// the model knows the arm.
 struct WorkFigures {
-  /// Upper bounds of the classes of promised deviations, mm. One more class holds what is above the
-  /// last.
+  /// Upper bounds of the classes of stated deviations, mm. One more class has the values above the
+  /// last bound.
   static constexpr std::array<double, 9> kBounds = {0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1};
 
   std::uint64_t inside = 0;   ///< poses in the model's domain
   std::uint64_t outside = 0;  ///< poses outside, answered by physics more or less alone
-  std::uint64_t left = 0;     ///< targets that were left as they were
+  std::uint64_t left = 0;     ///< targets that were left alone
   std::array<std::uint64_t, kBounds.size() + 1> in_class{};
   double sum_mm = 0;  ///< of the promised deviations
 
-  /// An answer with this standard deviation of the true error (root mean square of the three axes),
-  /// m.
+  /// Counts an answer with this standard deviation of the true error (root mean square of the three
+  /// axes), m.
   void answered(bool in_domain, double stddev) {
     ++(in_domain ? inside : outside);
     const double mm = 1e3 * stddev;

@@ -7,7 +7,7 @@
 namespace trammel {
 namespace {
 
-/// JSON has no NaN: what is not known is null.
+/// JSON has no NaN: an unknown number is null.
 std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{}", value) : "null";
 }

@@ -17,8 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kQueueBytes = std::size_t{64} << 20;
-constexpr std::size_t kFiles = 8;               // that share the room, where all are full
-constexpr std::uintmax_t kLeastOfAFile = 4096;  // that it takes of the disk
+constexpr std::size_t kFiles = 8;               // files that share the space, when all are full
+constexpr std::uintmax_t kLeastOfAFile = 4096;  // smallest use of the disk by a file
 constexpr int kNiceness = 5;
 constexpr const char* kBegin = "requests-";
 constexpr const char* kEnd = ".jsonl";
@@ -131,13 +131,13 @@ void RequestRecorder::record(std::function<std::string()> line, std::size_t byte
 
 void RequestRecorder::run(const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "recorder");
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // of this thread alone
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // this thread alone
   while (true) {
     Waiting next;
     {
       MutexLock lock(mutex_);
       changed_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty(); });
-      if (waiting_.empty()) return;  // only once it is to stop
+      if (waiting_.empty()) return;  // the recorder is about to stop
       next = std::move(waiting_.front());
       waiting_.pop_front();
     }
@@ -168,7 +168,7 @@ void RequestRecorder::next_file() {
   bool made = false;
   do {
     made = make_file(path_of(options_, ++number_));
-  } while (!made && errno == EEXIST);  // somebody else's
+  } while (!made && errno == EEXIST);  // the name is in use
   file_ = made ? std::ofstream(path_of(options_, number_), std::ios::binary | std::ios::app)
                : std::ofstream();
 }

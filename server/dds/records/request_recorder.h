@@ -18,30 +18,30 @@
 
 namespace trammel {
 
-/// A request and its answer as one line of JSON: README.md has its members. Nothing in it says
-/// who asked.
+/// A request and its answer as one line of JSON; README.md lists its members. It does not name the
+/// client.
 [[nodiscard]] std::string record_line(const wire::PredictErrorRequest& request,
                                       const wire::PredictErrorReply& reply, std::int64_t at_unix_s);
 [[nodiscard]] std::string record_line(const wire::CorrectTargetRequest& request,
                                       const wire::CorrectTargetReply& reply,
                                       std::int64_t at_unix_s);
 
-/// Writes what predictions and corrections were asked and answered to files that follow each other,
-/// in a thread of its own: nobody waits for the disk. What does not fit into its queue is dropped
-/// and counted. Thread-safe.
+/// Writes predictions and corrections, requests and answers, to a sequence of files, in a thread of
+/// its own, so that nobody waits for the disk. Lines that do not fit into its queue are dropped and
+/// counted. Thread-safe.
 class RequestRecorder {
  public:
   /// Checks that open() could make its folder; makes nothing.
   [[nodiscard]] static Status check(const RecordOptions& options);
-  /// Null where nothing is to be recorded. Makes the folder; refuses one that cannot be written.
+  /// Null if recording is off. Makes the folder; refuses one that cannot be written.
   [[nodiscard]] static Result<std::unique_ptr<RequestRecorder>> open(const RecordOptions& options);
-  ~RequestRecorder();  ///< writes what waits
+  ~RequestRecorder();  ///< writes the waiting lines
   RequestRecorder(const RequestRecorder&) = delete;
   RequestRecorder& operator=(const RequestRecorder&) = delete;
 
-  /// `bytes`: memory of what `line` holds.
+  /// `bytes`: the memory of the data that `line` captures.
   void record(std::function<std::string()> line, std::size_t bytes);
-  /// Requests that are in no file: there was no room in the queue, or the disk did not take them.
+  /// Requests that are in no file: the queue was full, or the disk refused them.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
  private:
@@ -53,8 +53,8 @@ class RequestRecorder {
   void run(const std::stop_token& stop);
   void write(const std::string& line);
   void next_file();
-  /// Drops what the disk has not taken whole; what was written before stays. A disk that is full
-  /// now may not be later.
+  /// Drops a line that the disk took only in part; earlier lines stay. A disk that is full now may
+  /// have space later.
   void give_up_file();
 
   const RecordOptions options_;

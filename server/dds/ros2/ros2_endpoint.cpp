@@ -21,8 +21,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Writes answers where all nodes hear them, once the node that asked does: its reader may be
-/// matched a little later than its writer, and nobody gets what was written before. Thread-safe.
+/// Writes answers to all nodes, once the asking node listens: its reader may be matched a little
+/// later than its writer, and a reader misses earlier samples. Thread-safe.
 template <typename Ros>
 class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListener {
  public:
@@ -59,8 +59,8 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
     post(to, std::move(reply), bytes);
   }
 
-  /// A reply that has no room is dropped: so many refusals wait only where nodes ask faster than
-  /// they can be told.
+  /// A reply without room is dropped: so many replies wait only if nodes ask faster than they can
+  /// be answered.
   void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override {
     {
       const MutexLock lock(mutex_);
@@ -73,7 +73,8 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
 
  private:
   static constexpr std::size_t kWrittenAtOnce = 64;
-  static constexpr std::chrono::milliseconds kLook{500};  // for what waits too long
+  static constexpr std::chrono::milliseconds kLook{500};  // period of the search for expired
+                                                          // replies
 
   Ros2Replies(ServiceCore& core, WorkUnderWay& writing)
       : core_(core), writing_(writing), waiting_(OutboxLimits{}) {}
@@ -105,8 +106,8 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
     });
   }
 
-  /// A question may come from another process than the one that hears the answer: after a while it
-  /// is written as well.
+  /// The process that asks may be another one than the process that hears the answer. After a while
+  /// the answer is therefore written in any case.
   [[nodiscard]] std::list<Parcel> wait_for_due(const std::stop_token& stop) {
     MutexLock lock(mutex_);
     due_.wait_for(lock, stop, kLook, [this]() TRAMMEL_REQUIRES(mutex_) { return has_news_; });

@@ -7,8 +7,8 @@
 namespace trammel {
 
 /// Answers ROS 2 nodes on an operation of ros2.h, in the same lanes and with the same limits as
-/// other clients. `writing` watches over what is written; all of these outlive it. `Ros`:
-/// wire::Ros2PredictErrors or wire::Ros2CorrectTargets.
+/// other clients. `writing` supervises the written samples; all arguments outlive the endpoint.
+/// `Ros`: wire::Ros2PredictErrors or wire::Ros2CorrectTargets.
 template <typename Ros>
 [[nodiscard]] Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint(
     ServiceCore& core, Lane& lane, WorkUnderWay& writing);

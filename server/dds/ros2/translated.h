@@ -14,14 +14,14 @@ using wire::ros2::CorrectTargets_;
 using wire::ros2::PredictedErrors_;
 using wire::ros2::PredictErrors_;
 
-/// The request that asks the same; its fault says where lists do not fit each other. `cells` tells
-/// rails from other joints.
+/// The equivalent request; its fault says which lists do not fit each other. `cells` gives the
+/// types of the joints.
 [[nodiscard]] std::unique_ptr<wire::Received<wire::PredictErrorRequest>> asked(
     const wire::ReceivedMessage<PredictErrors_>& message, const ServedCells& cells);
 [[nodiscard]] std::unique_ptr<wire::Received<wire::CorrectTargetRequest>> asked(
     const wire::ReceivedMessage<CorrectTargets_>& message, const ServedCells& cells);
 
-/// The message that answers the same. The id is the trace of the request.
+/// The equivalent message. Its id is the trace of the request.
 [[nodiscard]] PredictedErrors_ answered(const wire::PredictErrorReply& reply,
                                         const ServedCells& cells);
 [[nodiscard]] CorrectedTargets_ answered(const wire::CorrectTargetReply& reply,

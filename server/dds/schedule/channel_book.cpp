@@ -9,13 +9,13 @@ namespace {
 constexpr std::size_t kMostKnown = 4096;  // clients; more are heard when some have left
 constexpr int kPartitionsOfOne = 4;       // a participant may be as many clients
 constexpr std::size_t kMostBeside = 64;   // readers of others in a client's partition
-/// A channel costs all others something, too. A participant may come under so many names at once,
-/// and under one more in each period.
+/// A channel also costs all other clients something. A participant may use so many names at once,
+/// and one more in each period.
 constexpr int kNamesAtOnce = 8;
 constexpr std::chrono::milliseconds kPeriodOfName{500};
-constexpr std::size_t kOpenedAtOnce = 16;  // so that those who have a channel are not held up
-/// The longest penalty, for each client that is there: a change is told to all of them. Among few
-/// it is short, since some clients send nothing before they are matched.
+constexpr std::size_t kOpenedAtOnce = 16;  // so that clients with a channel are not held up
+/// The longest penalty, per present client, since all of them are notified of a change. With few
+/// clients it is short, since some clients send nothing before they are matched.
 constexpr std::chrono::milliseconds kPenaltyOfEach{100};
 constexpr std::chrono::milliseconds kLongestAmongFew{12'000}, kLongestAmongMany{30'000};
 
@@ -114,7 +114,7 @@ void ChannelBook::answered(const std::string& partition, SteadyTime now) {
   known->second.last_used = now;
 }
 
-/// Those who ask come before those who only listen.
+/// Asking clients come before clients that only listen.
 ChannelBook::Clients::iterator ChannelBook::first_waiting(SteadyTime now) {
   auto first = clients_.end();
   for (auto client = clients_.begin(); client != clients_.end(); ++client) {

@@ -20,11 +20,11 @@ struct ReplyReader {
   bool operator==(const ReplyReader&) const = default;
 };
 
-/// Who listens where, and which clients have a reply channel. Only the participant that was the
-/// first to listen in a partition gets replies there. When there are more clients than channels,
-/// those take turns that do nothing: the one whose last request is longest ago makes room for the
-/// one that has waited longest, a client that asked first. Whoever had a channel for nothing waits
-/// longer each time, and so does who comes under one name after the other, 12 s at most among few
+/// Records which participants listen where, and which clients have a reply channel. Only the first
+/// participant that listens in a partition gets replies there. If there are more clients than
+/// channels, idle ones take turns: the one with the oldest last request makes room for the one that
+/// has waited longest, asking clients first. A client that had a channel without using it waits
+/// longer each time, and so does one that uses one name after the other: at most 12 s among few
 /// clients and 30 s among hundreds. Not thread-safe.
 class ChannelBook {
  public:
@@ -40,16 +40,16 @@ class ChannelBook {
   /// yet.
   [[nodiscard]] bool may_listen(const std::string& participant, const std::string& partition) const;
   [[nodiscard]] bool listens(const std::string& participant, const std::string& partition) const;
-  /// A request of this client has come. True: it has no channel, and had not asked for one.
+  /// A request of this client has arrived. True: it has no channel, and had not asked for one.
   bool asked(const std::string& partition, SteadyTime now);
   /// The request has been answered. Between the two the client keeps its channel.
   void answered(const std::string& partition, SteadyTime now);
 
-  /// A step that is to be taken now. The caller does it.
+  /// A step for the caller to take now.
   struct Change {
     enum class Kind { kOpen, kClose } kind;
     std::string partition;
-    std::string topic;             ///< of kOpen: one of those that the client listens to
+    std::string topic;             ///< for kOpen: one of the topics that the client listens to
     std::string participant = {};  ///< of kOpen: the client's
   };
   [[nodiscard]] std::vector<Change> changes(SteadyTime now);
@@ -60,9 +60,9 @@ class ChannelBook {
  private:
   struct Client {
     std::string participant;
-    std::set<std::string> topics;  // that it listens to
+    std::set<std::string> topics;  // topics that it listens to
     std::vector<ReplyReader>
-        others;  // of participants that listen there too; they follow when it has left
+        others;  // other participants that listen there; they follow when it has left
     std::set<std::string> opened;  // topics with a writer
     bool is_open = false;
     bool was_useful = false;   // since it was opened
@@ -75,7 +75,7 @@ class ChannelBook {
   };
   /// A participant, which may be several clients.
   struct Listener {
-    int partitions = 0;      // that it listens in
+    int partitions = 0;      // number of partitions in which it listens
     SteadyTime next_free{};  // when its next partition would cost nothing; may lie ahead
   };
   using Clients = std::map<std::string, Client>;

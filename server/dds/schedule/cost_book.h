@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// The recent cost of an item, by the kind of work. A figure fades while nothing is measured: one
-/// that was taken on a stalled machine must not refuse work for ever. Not thread-safe.
+/// The recent cost of an item, by the kind of work. A figure fades while nothing is measured: a
+/// figure from a stalled machine must not refuse work for ever. Not thread-safe.
 class CostBook {
  public:
   /// 0 for work that was never measured.

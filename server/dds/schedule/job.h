@@ -15,12 +15,12 @@ using Cost = std::chrono::duration<double>;
 struct Shed {
   std::string why;  ///< one clause
   std::chrono::milliseconds retry_after{0};
-  bool too_late = false;  ///< it was taken in, and its time is over now
+  bool too_late = false;  ///< it was accepted, but its time is over now
 };
 
-/// A request that is worked on in portions. Its items (targets, joint vectors) do not depend on
-/// each other. begin(), finish() and shed() are called once at most, by one thread each; of
-/// finish() and shed() exactly one is called.
+/// A request that is processed in portions. Its items (targets, joint vectors) do not depend on
+/// each other. begin(), finish() and shed() are called at most once, by one thread each; exactly
+/// one of finish() and shed() is called.
 class Job {
  public:
   virtual ~Job() = default;
@@ -32,18 +32,17 @@ class Job {
   virtual void compute(std::size_t first, std::size_t count) = 0;
   /// Answers: all items are computed.
   virtual void finish() = 0;
-  /// Answers that there is no time for it.
+  /// Answers that there is not enough time for it.
   virtual void shed(const Shed& shed) = 0;
 };
 
 /// The facts that the schedule must know of a request.
 struct Ask {
-  std::string client;     ///< who sent it; clients are served in turn
+  std::string client;     ///< the sender; clients are served in turn
   std::string cell = {};  ///< empty: of no cell in particular
-  std::string work =
-      {};  ///< what costs alike: such requests share a figure for the cost of an item
-  std::size_t items = 1;  ///< as far as the request tells
-  std::size_t bytes = 0;  ///< of memory while it waits
+  std::string work = {};  ///< requests with the same kind share a figure for the cost of an item
+  std::size_t items = 1;  ///< as far as the request shows
+  std::size_t bytes = 0;  ///< memory while it waits
   SteadyTime start_by{};  ///< nobody waits any longer for the beginning of the work
   std::optional<SteadyTime> finish_by = {};  ///< nor for its end
 };

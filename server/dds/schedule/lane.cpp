@@ -14,9 +14,10 @@ namespace {
 constexpr std::size_t kMostAtOnce = 256;    // items between two looks at the clock
 constexpr std::size_t kPartsOfPortion = 8;  // a look at the clock after about such a part
 constexpr std::chrono::milliseconds kSoon{1000};
-constexpr std::chrono::milliseconds kLateTick{50};  // so late is told that there was no time
+constexpr std::chrono::milliseconds kLateTick{50};  // the delay with which a lack of time is
+                                                    // reported
 
-/// Items that take about an eighth of a portion, by those computed so far.
+/// The number of items that take about an eighth of a portion, by the items computed so far.
 std::size_t next_size(std::size_t items, Cost took, Cost portion) {
   if (items == 0 || took <= Cost(0)) return 1;
   const double fits = static_cast<double>(items) / took.count() * portion.count() / kPartsOfPortion;
@@ -90,7 +91,7 @@ std::optional<Turns::Portion> Lane::next(Turns::Which which) {
 
 void Lane::work(const std::stop_token& stop, Turns::Which which) {
   ::pthread_setname_np(::pthread_self(), "requests");
-  // The priority of this thread alone, as Linux has it.
+  // The priority of this thread alone, which Linux allows.
   if (nice_ != 0) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), nice_);
   while (!stop.stop_requested()) {
     if (step(which)) continue;

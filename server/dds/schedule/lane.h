@@ -36,21 +36,21 @@ class Lane {
   void start();
   /// Lets the portions under way end, and sheds all other requests. Nothing is taken in afterwards.
   void stop();
-  /// Takes the request in, or tells why not. Does not wait and does not work; the caller sheds what
-  /// is not taken in.
+  /// Accepts the request, or returns the reason of a rejection. Neither waits nor works; the caller
+  /// sheds a rejected request.
   [[nodiscard]] std::optional<Shed> submit(std::shared_ptr<Job> job, Ask ask);
   /// See Turns::set_limits().
   void set_limits(const TurnLimits& limits);
   /// Works on one portion in the calling thread. False: there was nothing to do.
   [[nodiscard]] bool step(Turns::Which which = Turns::Which::kAll);
-  /// Sheds what waits although its time is over, however busy the workers are.
+  /// Sheds waiting requests whose time is over, even if all workers are busy.
   void shed_late();
 
   [[nodiscard]] std::size_t requests() const;
-  /// A number while workers are at portions, that of the portion begun first. Takes no lock.
+  /// The number of the oldest portion under way; empty if there is none. Takes no lock.
   [[nodiscard]] std::optional<std::uint64_t> oldest_portion() const { return under_way_.oldest(); }
-  /// For the watchdog: a number while a request could be worked on and an idle worker has not taken
-  /// it up; else empty. The number is how many portions were taken up before. Takes no lock.
+  /// For the watchdog: a number if a request could be processed but no idle worker has taken it;
+  /// else empty. It is the number of portions taken so far. Takes no lock.
   [[nodiscard]] std::optional<std::uint64_t> unseen() const;
 
  private:

@@ -19,26 +19,26 @@ struct OutboxLimits {
 
 /// A reply on its way.
 struct Parcel {
-  std::string client;     ///< who asked: its replies share a limit
-  std::string partition;  ///< where it listens
+  std::string client;     ///< the client that asked: its replies share a limit
+  std::string partition;  ///< the partition in which it listens
   std::string topic;
   std::shared_ptr<void> reply;
   std::size_t bytes = 0;  ///< of memory
   SteadyTime until{};     ///< when it is dropped
 };
 
-/// Replies that cannot be written yet: nobody listens, or the thread that has them may not write.
-/// Not thread-safe.
+/// Replies that cannot be written yet, because nobody listens or because their thread must not
+/// write. Not thread-safe.
 class Outbox {
  public:
   explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}
 
   /// False, and the parcel is dropped, when there is no room.
   [[nodiscard]] bool put(Parcel parcel);
-  /// Takes out those that `may_go`, oldest first, at most `most`.
+  /// Takes out replies that `may_go`, oldest first, at most `most`.
   [[nodiscard]] std::list<Parcel> take(std::size_t most,
                                        const std::function<bool(const Parcel&)>& may_go);
-  /// Drops what is out of date. Returns how many.
+  /// Drops expired replies. Returns their number.
   std::size_t expire(SteadyTime now);
   [[nodiscard]] bool empty() const { return parcels_.empty(); }
   [[nodiscard]] bool has_for(const std::string& partition) const;

@@ -34,7 +34,7 @@ Room::Place::~Place() {
 
 std::optional<Room::Place> Room::take(const std::string& client, const std::string& cell,
                                       std::size_t bytes) {
-  const std::size_t some = bytes + 1;  // an entry of nothing must not look like no entry
+  const std::size_t some = bytes + 1;  // an entry of size zero must differ from no entry
   const MutexLock lock(mutex_);
   const auto cell_limit =
       static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.bytes));

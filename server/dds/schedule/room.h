@@ -10,8 +10,8 @@
 namespace trammel {
 
 struct RoomLimits {
-  std::size_t bytes = 256u << 20;        ///< of all requests that wait or are worked on
-  std::size_t client_bytes = 64u << 20;  ///< of those of one client
+  std::size_t bytes = 256u << 20;        ///< of all requests that wait or are processed
+  std::size_t client_bytes = 64u << 20;  ///< for those of one client
   double cell_share = 0.5;               ///< of `bytes`, for those of one cell
 };
 
@@ -35,12 +35,12 @@ class Room {
     std::size_t bytes_;
   };
 
-  /// Empty when the room, the client's share or the cell's share (no cell: no such limit) is used
-  /// up.
+  /// Empty if the room, the client's share or the cell's share is used up (requests without a cell
+  /// have no such limit).
   [[nodiscard]] std::optional<Place> take(const std::string& client, const std::string& cell,
                                           std::size_t bytes);
   [[nodiscard]] std::size_t bytes() const;
-  /// From now on; what is in the room already stays.
+  /// Sets the limits; requests already in the room stay.
   void set_limits(const RoomLimits& limits);
 
  private:

@@ -51,7 +51,7 @@ Turns::Client& Turns::arrived(const std::string& name) {
   return client;
 }
 
-/// Who has had more than the others stays known: it must not come back as somebody new.
+/// A client that had more time than the others stays known: it must not return as a new one.
 void Turns::forget_clients() {
   std::erase_if(clients_, [this](const auto& known) {
     return known.second.entries.empty() && known.second.running == 0 && known.second.had <= level_;
@@ -159,7 +159,7 @@ std::optional<Turns::Portion> Turns::next_late(SteadyTime now) {
 
 Turns::Portion Turns::hand_out(Client& client, std::shared_ptr<Entry> entry, SteadyTime now) {
   if (auto late = too_late(client, *entry, now)) {
-    entry->given_up_ = true;  // this portion is its last where others are under way
+    entry->given_up_ = true;  // if other portions are under way, this one is its last
     if (entry->running_ == 0) {
       remove(client, *entry);
       return {std::move(entry), Part::kShed, std::move(*late)};
@@ -218,7 +218,7 @@ bool Turns::settle(const Portion& portion, const Done& done, SteadyTime now) {
   return false;
 }
 
-/// The portions of other workers may still be under way; they find it over.
+/// Portions of other workers may still be under way; these workers find the request removed.
 void Turns::remove(Client& client, Entry& entry) {
   entry.state_ = Entry::State::kOver;
   client.backlog -= entry.left_;

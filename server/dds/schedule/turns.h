@@ -18,27 +18,27 @@ namespace trammel {
 
 struct TurnLimits {
   std::size_t workers = 2;
-  /// More workers, who take up short requests only. They mostly sleep, so the system lets them run
-  /// at once where the others have computed all the time and wait for a core themselves.
+  /// Additional workers for short requests only. They mostly sleep, so the system runs them at once
+  /// while the other workers compete for the cores.
   std::size_t express_workers = 0;
   Cost portion{0.002};  ///< a worker goes to the next request after this, or after one item
-  std::size_t client_requests = 64;  ///< of one client that wait or are worked on
+  std::size_t client_requests = 64;  ///< of one client that wait or are processed
   std::size_t requests = 4096;       ///< of all clients
   double cell_share = 0.5;           ///< of `requests`, for one cell
   std::size_t client_workers = 64;   ///< that work for one client at a time
   std::size_t cell_workers = 64;     ///< that work for one cell at a time
 };
 
-/// Which request a worker takes up next. The client comes next that has had the least of the
-/// workers' time: whoever waits with many or with long requests waits behind his own, and takes
-/// turns with the others portion by portion. A client that was away starts level with those who
-/// stayed. Among clients that had the same, the one that has waited longest for a portion comes
-/// first. No lock, no clock, no thread.
+/// Chooses the next request for a worker. The client with the least of the workers' time so far is
+/// next. So a client with many or long requests waits behind its own requests, and takes turns with
+/// the others portion by portion. A client that was away starts level with the others. Among
+/// clients with equal time, the one that has waited longest for a portion comes first. No lock, no
+/// clock, no thread.
 class Turns {
  public:
   explicit Turns(const TurnLimits& limits) : limits_(limits) {}
 
-  /// From now on as many requests may wait, of each client, of all and of one cell; the rest stays.
+  /// Sets the limits for waiting requests: per client, in total, and per cell; other limits stay.
   void set_limits(const TurnLimits& limits);
 
   /// A request from its admission to its answer.
@@ -79,29 +79,28 @@ class Turns {
 
   /// The outcome of a portion.
   struct Done {
-    Cost took{0};           ///< all of it
-    Cost computing{0};      ///< of this, for the items
+    Cost took{0};           ///< the whole portion
+    Cost computing{0};      ///< the part of it for the items
     std::size_t items = 0;  ///< computed
-    bool answered = false;  ///< with it the request is over
+    bool answered = false;  ///< the request is over with it
   };
 
-  /// Takes the request in, or tells why not. What cannot be done in time by what is known of the
-  /// costs is not taken in.
+  /// Adds the request, or says why not. A request that cannot finish in time, by the known costs,
+  /// is not added.
   [[nodiscard]] std::optional<Shed> add(std::shared_ptr<Job> job, Ask ask, Room::Place place,
                                         SteadyTime now);
-  /// Which requests are looked at: all, or those that are done within one portion by what is known
-  /// of the costs.
+  /// The requests to consider: all, or those that one portion finishes by the known costs.
   enum class Which { kAll, kShort };
   /// Empty when there is nothing that may be worked on.
   [[nodiscard]] std::optional<Portion> next(SteadyTime now, Which which = Which::kAll);
   /// True if next(kAll) would give a portion.
   [[nodiscard]] bool has_work() const;
-  /// A request that nobody works on and whose time is over, taken out; empty when there is none.
+  /// Removes and returns a request without a worker whose time is over; empty if there is none.
   [[nodiscard]] std::optional<Portion> next_late(SteadyTime now);
   /// After Job::begin(): other workers may join.
   void open(Entry& entry, std::size_t items);
-  /// Ends a portion of another part than kShed. True: the request is given up and nobody works for
-  /// it any longer, so the caller sheds it.
+  /// Ends a portion of another kind than kShed. True: the request is given up and no worker has it
+  /// any longer, so the caller sheds it.
   [[nodiscard]] bool settle(const Portion& portion, const Done& done, SteadyTime now);
 
   /// When a client whose request found no room should try again.
@@ -113,7 +112,7 @@ class Turns {
 
  private:
   struct Client {
-    double had = 0;           // s of the workers' time, level with `level_` when it comes
+    double had = 0;           // s of the workers' time; at least `level_` after a pause
     std::uint64_t turn = 0;   // number of its last portion
     std::size_t running = 0;  // portions under way
     Cost backlog{0};          // estimated
@@ -143,7 +142,7 @@ class Turns {
   std::unordered_map<std::string, Client> clients_;
   std::unordered_map<std::string, CellUse> cells_;
   std::size_t requests_ = 0;
-  double level_ = 0;         // what the client had that was served last
+  double level_ = 0;         // the time of the client that was served last
   std::uint64_t turns_ = 0;  // portions handed out
 };
 
