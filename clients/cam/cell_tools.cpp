@@ -52,7 +52,7 @@ std::string load_difference(const ProgramTool& tool, const std::string& name,
                      to_mm((load.p_F - payload.p_FoCog_F).norm()));
 }
 
-/// The tool of the cell whose name a program's tool has, case left aside.
+/// The tool of the cell with the name of the program's tool, ignoring case.
 std::map<std::string, Pose>::const_iterator named(const CellTools& cell, const std::string& name) {
   return std::find_if(cell.tools.begin(), cell.tools.end(),
                       [&](const auto& tool) { return lower(tool.first) == lower(name); });
@@ -78,7 +78,7 @@ class Choosing {
       }
       any |= choices[k].why_not.empty();
     }
-    // Where no tool is the cell's, the program is not of this cell.
+    // If no tool belongs to the cell, the program does not belong to the cell.
     for (std::size_t k = 0; k < choices.size() && !any; ++k) {
       if (uses[k] != ToolUse::kNone && (program_.tools[k].X_FT || program_.tools[k].load))
         refuse(program_.tools[k], choices[k].why_not);
@@ -100,7 +100,7 @@ class Choosing {
     refusals_.push_back(std::move(error));
   }
 
-  /// The tool that is asked for, or the cell's only one; else the one that the program means.
+  /// The requested tool, or the cell's only one; otherwise the one that the program means.
   ToolChoice choice_of_the_cell(const ProgramTool& tool) {
     const auto asked = cell_.tools.find(asked_);
     const bool only = asked_.empty() && cell_.tools.size() == 1;
@@ -116,7 +116,7 @@ class Choosing {
 
   ToolChoice choice(const ProgramTool& tool) {
     ToolChoice choice;
-    // A table says nothing of its tool: it is the cell's, where it has one.
+    // A table does not name its tool: it is the cell's only one, if the cell has exactly one.
     if (tool.name.empty() && asked_.empty() && cell_.tools.size() == 1) {
       choice.tool = cell_.tools.begin()->first;
       return choice;
@@ -129,7 +129,7 @@ class Choosing {
             "tool {} is not in the files: it is taken for {} of the cell without comparing them",
             shown(tool.name), by_name->first);
       } else if (!same_tool(tool, by_name->second)) {
-        // Another tool of the program may be meant by --tool; one of the same name cannot.
+        // --tool may mean another tool of the program, but not one of the same name.
         choice.why_not = difference_text(tool, by_name->first, by_name->second);
         if (lower(by_name->first) == lower(tool.name)) refuse(tool, choice.why_not);
       }
@@ -180,7 +180,7 @@ class Choosing {
           cell_.payloads.empty() ? "the cell has no payloads" : "none of the cell's payloads");
     if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
     const std::string why = load_difference(tool, known->first, known->second);
-    // A load that is carried for a part of the program concerns that part.
+    // A load that the program carries only for a while concerns that part only.
     if (tool.carries.empty())
       refuse(tool, why);
     else

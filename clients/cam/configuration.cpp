@@ -23,16 +23,17 @@ constexpr double kSameJoints = 1e-6;  // rad
 constexpr double kAsNear =
     1e-2;  // of the way: how a controller weighs its joints is not known to more
 
-/// The way in which a controller weighs the joints is not published. Ways that differ by less than
-/// kAsNear are decided where their sums and their longest joints say the same.
+/// True if one way is shorter. The weights that controllers give the joints are not published. So
+/// ways that differ by less than kAsNear are decided only if their sums and their longest joints
+/// agree.
 bool is_nearer(const JointVector& way, const JointVector& other) {
   if (other.norm() - way.norm() > kSameJoints + kAsNear * way.norm()) return true;
   return other.lpNorm<1>() - way.lpNorm<1>() > kSameJoints &&
          way.lpNorm<Eigen::Infinity>() - other.lpNorm<Eigen::Infinity>() < kSameJoints;
 }
 
-/// Where the branch that is said has joints far outside the quarter turns that are said, which
-/// joints and how. A stretched wrist leaves joints 4 and 6 open.
+/// Describes a branch that needs joints far outside the stated quarter turns: the joints and their
+/// turns. A stretched wrist leaves joints 4 and 6 open.
 std::string contradiction(const Configuration& said, const JointVector& q) {
   std::vector<std::string> joints;
   for (std::size_t j = 0; said.conf && j < said.near.size(); ++j) {
@@ -60,7 +61,7 @@ std::string contradiction(const Configuration& said, const JointVector& q) {
       fmt::join(joints, ", "));
 }
 
-/// Where the wrist is stretched joint 4 may be anywhere: it stays.
+/// Keeps joint 4 where the wrist is stretched, since it may then have any angle.
 JointVector with_joint_4_held(const Chain& arm, const JointVector& q, const JointVector& before) {
   const auto wrist = wrist_opening(arm, q, kStretched);
   if (!wrist) return q;
@@ -98,7 +99,8 @@ bool positive_5_bends_down(const Chain& arm) {
   return bent.z() < straight.z();
 }
 
-/// Turns of joints 1, 4 and 6 that the limits allow, as the program says, or near to `previous`.
+/// Chooses turns of joints 1, 4 and 6 within the limits: the turns that the program gives, else the
+/// turns nearest to `previous`.
 void choose_turns(const Chain& arm, const Configuration& said,
                   const std::optional<JointVector>& previous, JointVector& q) {
   for (int j = 0; j < arm.size(); ++j) {
@@ -130,7 +132,7 @@ void choose_turns(const Chain& arm, const Configuration& said,
 
 bool keeps_configuration(const Configuration& said, const std::vector<double>& before,
                          const std::vector<double>& now, double beyond_quarter) {
-  // A program may say what it does not hold: then an axis stays where it was.
+  // If a program leaves an axis open, the axis keeps its previous value.
   const auto holds = [&](std::size_t axis, const auto& part_of, int wanted) {
     const int part = part_of(now[axis]);
     return part == wanted || (axis < before.size() && part == part_of(before[axis]));

@@ -8,19 +8,18 @@
 #include "server/base/units.h"
 #include "server/robot/inverse_kinematics.h"
 
-/// The joints that a controller takes for a target, by what the program says of the configuration.
+/// The joints that a controller takes for a target, given the configuration in the program.
 namespace trammel::cam {
 
-/// rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that
-/// is off by less is of the branch that was meant. Controllers do not ask for more.
+/// rad, beyond a quarter turn: in another branch joint 4 differs by half a turn, so a joint with a
+/// smaller difference is in the intended branch. Controllers demand no more.
 constexpr double kNextQuarter = kPi / 4;
 
 struct NominalJoints {
   std::optional<JointVector> q;  ///< rad; empty: none found
   std::optional<int> conf;       ///< the branch, where the arm has numbered branches
   std::string why_not;
-  std::string doubt =
-      {};  ///< what the program says of the configuration contradicts itself; empty: it does not
+  std::string doubt = {};  ///< the contradiction in the program's configuration; empty: none
 };
 
 /// Robot arm with its rail, if any, as a chain and as the six turning axes alone.
@@ -28,8 +27,8 @@ class ArmOfProgram {
  public:
   explicit ArmOfProgram(const Chain& robot);
 
-  /// Joints for X_BF. `previous`: of the motion before, which decides what the program leaves open;
-  /// without one, the joints nearest to zero.
+  /// Joints for X_BF. `previous`: the joints after the motion before, which decide whatever the
+  /// program leaves open; without them it takes the joints nearest to zero.
   [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said,
                                      const std::map<int, double>& external,
                                      const std::optional<JointVector>& previous) const;
@@ -42,7 +41,7 @@ class ArmOfProgram {
   [[nodiscard]] std::optional<JointVector> from_axes(const std::vector<double>& axes,
                                                      const std::map<int, double>& external) const;
   [[nodiscard]] std::vector<double> to_axes(const JointVector& q) const;
-  /// The joints near `q`, with the rail where it is, that bring the flange to X_BF.
+  /// The joints near `q` that bring the flange to X_BF, with the rail unmoved.
   [[nodiscard]] JointVector near(const Pose& X_BF, const JointVector& q) const;
   [[nodiscard]] bool has_rail() const { return !rails_.empty(); }
   [[nodiscard]] const Chain& robot() const { return robot_; }
@@ -62,7 +61,7 @@ class ArmOfProgram {
                                       const Solve& solve) const;
   [[nodiscard]] std::optional<JointVector> branch(const Chain& arm, const Pose& X_BF, int number,
                                                   const JointVector& near) const;
-  /// The branches that `q` is in: several where they meet.
+  /// The branches of `q`; several where they meet.
   [[nodiscard]] std::vector<int> branches_of(const Chain& arm, const JointVector& q) const;
   [[nodiscard]] NominalJoints nearest_branch(const Chain& arm, const Pose& X_BF,
                                              const JointVector& from, bool on_a_line) const;
@@ -80,9 +79,9 @@ class ArmOfProgram {
   bool bends_down_ = true;  ///< positive joint 5 bends the tool downward
 };
 
-/// True if axes (deg) are as the program says them, or where it contradicts itself as the ones
-/// before were (none: these are not known). `beyond_quarter`: rad, how far a joint may leave the
-/// quarter turn that is said.
+/// True if the axes (deg) are as the program states them. If the program contradicts itself, they
+/// must be as in the previous target (none: not known). `beyond_quarter`: rad, how far a joint may
+/// leave its stated quarter turn.
 [[nodiscard]] bool keeps_configuration(const Configuration& said, const std::vector<double>& before,
                                        const std::vector<double>& now, double beyond_quarter = 0);
 

@@ -23,9 +23,9 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr double kShareOfSigma = 0.1;        // that rounding may take
+constexpr double kShareOfSigma = 0.1;        // share of sigma that rounding may take
 constexpr double kLeastRoundingMm = 1e-6;    // no digits beyond
-constexpr double kDefaultRoundingMm = 1e-3;  // where no sigma is known
+constexpr double kDefaultRoundingMm = 1e-3;  // if no sigma is known
 constexpr double kRotationRounding = 1e-6;   // rad: 1 µm at 1 m
 constexpr double kReach = 3;                 // m, the lever of a joint
 constexpr double kAlongTheAxis = 0.02;       // of a way, off the tool's axis
@@ -148,7 +148,7 @@ class Correcting {
     return {};
   }
 
-  /// The lead-in to a target, or why there is none.
+  /// The lead-in to a target, or the reason why there is none.
   [[nodiscard]] LeadInFound way_to(std::size_t t, const exchange::CorrectedTarget& item) const {
     if (arm_.has_rail()) return {{}, "the arm stands on a rail"};
     double back_off = kBackOff;
@@ -230,7 +230,7 @@ class Correcting {
     }
   }
 
-  /// How many points a file has now.
+  /// The number of points that a file has now.
   void write_counts() {
     for (const auto& [file, more] : new_points_) {
       const PointList& list = program_.points[file];
@@ -268,7 +268,7 @@ class Correcting {
     const Pose X_BT = exchange::to_si(item.commanded);
     const Pose X_TF = cell_.tools.at(nominal_.tools[target.tool].tool).inverse();
     JointVector q = exchange::si_from_degrees(item.joints_deg, arm_.robot());
-    // The rail stays where the program has it.
+    // The rail keeps the program's position.
     row.joints = item.joints_deg;
     if (const auto& nominal = nominal_.targets[t].q; arm_.has_rail() && nominal) {
       q = arm_.near(X_BT * X_TF, *nominal);
@@ -393,8 +393,8 @@ class Correcting {
     return std::move(result_);
   }
 
-  /// Tells of what is left as it stands and moves all the same where it is made of a target that is
-  /// corrected.
+  /// Reports positions that stay unchanged in the program and move nevertheless, since they are
+  /// computed from a corrected target.
   void tell_readings() {
     if (program_.readings.empty()) return;
     std::set<std::pair<std::size_t, std::size_t>> written;
@@ -411,7 +411,8 @@ class Correcting {
         by_line.emplace(std::pair(result_.rows[r].file, result_.rows[r].line), r);
     }
     std::set<std::string> said;
-    std::set<std::pair<std::size_t, std::string>> told;  // rows, and what they move with
+    std::set<std::pair<std::size_t, std::string>> told;  // rows, and the targets with which they
+                                                         // move
     for (const Reading& reading : program_.readings) {
       const auto first = written.lower_bound({reading.file, reading.of.begin});
       if (first == written.end() || first->first != reading.file || first->second >= reading.of.end)
@@ -439,8 +440,7 @@ class Correcting {
     row.message += fmt::format("; it moves with {}, which is corrected", shown(with));
   }
 
-  /// A motion that is left goes to a stored target all the same, which another motion has
-  /// corrected.
+  /// Reports uncorrected motions to a stored target that is corrected for another motion.
   void tell_stored() {
     const auto is_name = [](const std::string& text) {
       return !text.empty() && text.find_first_of(" ,(:") == std::string::npos && text[0] != '[' &&
@@ -487,7 +487,7 @@ class Correcting {
   }
 
   const Program& program_;
-  const Program& original_;  ///< as it was read: its poses are not turned
+  const Program& original_;  ///< in the state before the poses were turned
   const std::vector<double>& turned_deg_;
   const ArmOfProgram& arm_;
   const CellTools& cell_;

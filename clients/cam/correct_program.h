@@ -19,13 +19,13 @@ namespace trammel::cam {
 struct CorrectProgramOptions {
   std::string tool, payload;  ///< of the cell, as the user named them
   bool keep_digits = false;   ///< numbers keep their decimals, whatever rounding costs
-  std::string version;        ///< of this program, for the mark
+  std::string version;        ///< version of this software, for the mark
   std::string date;           ///< for the mark
   std::optional<LeadInOptions> lead_in = {};  ///< empty: no point is inserted
   bool free_rz = false;  ///< the tool may turn about its axis: see free_turns.h
 };
 
-/// Refuses what choose_tools() refuses, a file that is marked as corrected, and what `ask` refuses.
+/// Refuses the same as choose_tools() and `ask`, and a file that is marked as corrected.
 [[nodiscard]] Result<CorrectedProgram> correct_program(const Program& program, const Chain& robot,
                                                        const CellTools& cell,
                                                        const AskCorrections& ask,

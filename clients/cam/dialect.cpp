@@ -24,7 +24,7 @@ struct Entry {
   std::vector<std::string> endings;
   Program (*read)(std::vector<SourceFile>, const ReadOptions&);
   const char* motions;
-  std::vector<const char*> rows;  ///< how the names of its tools and frames begin in --frames
+  std::vector<const char*> rows;  ///< the beginnings of its tool and frame names in --frames
 };
 
 const std::vector<Entry>& entries() {

@@ -11,7 +11,7 @@ namespace trammel::cam {
 class Edits {
  public:
   void replace(Span span, std::string text) { replacements_.push_back({span, std::move(text)}); }
-  /// A whole line above the line that begins at `at`; it ends as the lines of the text do.
+  /// Inserts a whole line above the line that begins at `at`, with the line ends of the text.
   void insert_line(std::size_t at, std::string line) { lines_.push_back({at, std::move(line)}); }
   [[nodiscard]] bool empty() const { return replacements_.empty() && lines_.empty(); }
 

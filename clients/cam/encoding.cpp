@@ -25,8 +25,8 @@ void add_utf8(std::uint32_t point, std::string& text) {
   for (int k = more - 1; k >= 0; --k) add_byte(0x80u | (point >> (6 * k) & 0x3Fu), text);
 }
 
-/// The code point that begins at a byte of UTF-8; `at` goes behind it. A byte that begins none
-/// stands for itself.
+/// The code point that begins at a byte of UTF-8; `at` goes behind it. A byte that begins no such
+/// sequence is a character by itself.
 std::uint32_t next_point(std::string_view text, std::size_t& at) {
   const std::uint32_t lead = byte_at(text, at++);
   const int more = lead < 0xC0 ? 0 : lead < 0xE0 ? 1 : lead < 0xF0 ? 2 : 3;

@@ -9,7 +9,7 @@ namespace {
 
 using Kind = Step::Kind;
 
-/// A block with the places that its parts begin at.
+/// A block with the first step of each part.
 struct Block {
   std::size_t head = 0, end = 0;
   std::vector<std::size_t> branches;  ///< steps kCase and kElse
@@ -89,7 +89,7 @@ class Order {
   [[nodiscard]] Kind kind_of(std::size_t block) const { return steps_[blocks_[block].head].kind; }
   [[nodiscard]] std::size_t behind(std::size_t block) const { return blocks_[block].end + 1; }
 
-  /// The innermost block around a step that `wanted` is true of.
+  /// The innermost block around a step for which `wanted` is true.
   template <typename Wanted>
   [[nodiscard]] std::size_t around(std::size_t step, const Wanted& wanted) const {
     std::size_t block = in_[step];
@@ -113,7 +113,7 @@ class Order {
         return enter(s);
       case Kind::kCase:
       case Kind::kElse:
-        // Nothing leads to the first but the head of its block.
+        // The first case is reached only from the head of its block.
         if (in_[s] != kNone && kind_of(in_[s]) == Kind::kSwitch &&
             blocks_[in_[s]].branches.front() == s)
           return add(s, s + 1);
@@ -220,8 +220,8 @@ class Order {
     }
   }
 
-  /// A routine without a handler of its own ends where it fails, if a handler of those that call it
-  /// goes on from there.
+  /// A routine without a handler of its own ends at the failing statement, if a handler of one of
+  /// its callers goes on from there.
   void end_where_they_fail(const std::vector<Aside>& asides) {
     std::vector<bool> handles(blocks_.size(), false), ends(blocks_.size(), false);
     std::vector<std::size_t> open;

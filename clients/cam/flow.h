@@ -9,53 +9,54 @@
 #include <utility>
 #include <vector>
 
-/// In which order the statements of a program may come, and what holds before each of them. Every
-/// dialect says what its statements do; loops, jumps, calls, interrupts and error handlers are
-/// followed here, for all of them alike.
+/// The possible orders of a program's statements, and the settings before each of them. Every
+/// dialect describes its statements; loops, jumps, calls, interrupts and error handlers are
+/// followed here, in the same way for all dialects.
 namespace trammel::cam {
 
 /// The effect of a statement on the order.
 struct Step {
   enum class Kind {
     kPlain,
-    kIf,         ///< opens a block that may be passed over
-    kSwitch,     ///< opens a block of kCase and kElse
-    kCase,       ///< another branch of the block, `ELSEIF` too
-    kElse,       ///< the last branch of the block, without a condition
-    kWhile,      ///< opens a block that repeats, or is passed over
-    kRepeat,     ///< opens a block that repeats and is entered
-    kRoutine,    ///< opens a block that calls enter; one that nothing calls is entered by whoever
-                 ///< runs the program
+    kIf,       ///< opens a block that may be passed over
+    kSwitch,   ///< opens a block of kCase and kElse
+    kCase,     ///< another branch of the block, `ELSEIF` too
+    kElse,     ///< the last branch of the block, without a condition
+    kWhile,    ///< opens a block that repeats, or is passed over
+    kRepeat,   ///< opens a block that repeats and is entered
+    kRoutine,  ///< opens a block that calls enter; a block without calls is entered by the user who
+               ///< runs the program
     kInterrupt,  ///< opens a block that comes in before any other statement, and goes back there
     kEnd,        ///< of the innermost block
     kExit,       ///< to behind the innermost loop
     kContinue,   ///< to the head of the innermost loop
     kReturn,     ///< from the routine
-    kHandler,    ///< ends what stands above it in the routine; comes in where a statement of that
-                 ///< fails
-    kGoBack,     ///< from a handler to where it came in
-    kLabel,      ///< where jumps go
+    kHandler,    ///< ends the statements above it in the routine; entered when one of these fails
+    kGoBack,     ///< from a handler back to the place where it was entered
+    kLabel,      ///< target of jumps
     kJump,       ///< to the labels of that name
     kJumpMaybe,  ///< there, or on
-    kCall        ///< of the routine of that name; of one that is not there: nothing
+    kCall        ///< of the routine of that name; without one it has no effect
   };
   Kind kind = Kind::kPlain;
   std::string label =
-      {};  ///< of a label, jump, routine or call; of an interrupt or handler: as reasons call it
-  bool never_fails = false;  ///< no error handler comes in at it
+      {};  ///< of a label, jump, routine or call; for an interrupt or handler, the name in reasons
+  bool never_fails = false;  ///< no error handler is entered at it
 };
 
 /// Statements that come in before others and may go back there: an interrupt routine, an error
 /// handler.
 struct Aside {
   std::string name;
-  std::size_t first = 0, end = 0;  ///< its statements; it is not left beyond `end` on the way back
+  std::size_t first = 0, end = 0;  ///< its statements; on the way back, control does not leave it
+                                   ///< beyond `end`
   std::vector<std::size_t> goes_back;  ///< the steps that lead back
-  std::size_t from = 0, to = 0;  ///< it comes in before the steps [from, to) that are not its own
-  bool at_failures = false;      ///< not before steps that never fail
+  std::size_t from = 0, to = 0;  ///< it may be entered before the steps [from, to), which are not
+                                 ///< its own
+  bool at_failures = false;      ///< true: not before steps that never fail
 };
 
-/// Where a program may go.
+/// The possible paths of a program.
 struct Flow {
   std::vector<std::vector<std::size_t>>
       next;                          ///< statements that may come behind each; their number: none
@@ -120,7 +121,7 @@ class StatesBefore {
     }
   }
 
-  /// Adds what asides make of a state before a step, until they change it no more.
+  /// Adds the effects of asides on the state before a step, until the state no longer changes.
   void come_in(std::size_t step, State& state) {
     for (bool more = true; more;) {
       more = false;
@@ -141,8 +142,8 @@ class StatesBefore {
     if (also_) also_(state);
   }
 
-  /// The state with which an aside leads back that comes in where `state` holds; empty: it does not
-  /// go back.
+  /// The state with which an aside returns if it is entered with `state`; empty: it does not
+  /// return.
   std::optional<State> made_by(std::size_t a, const State& state) {
     made_.resize(flow_.asides.size());
     for (const auto& [before, after] : made_[a]) {
@@ -185,18 +186,17 @@ class StatesBefore {
   const Apply& apply_;
   const Join& join_;
   const std::function<void(State&)>& also_;
-  States before_;               ///< with what asides make of it
-  States reached_;              ///< as the statements above lead to it
+  States before_;               ///< including the effects of asides
+  States reached_;              ///< reached through the statements above
   std::set<std::size_t> open_;  ///< in the order of the text
   std::vector<std::vector<std::pair<State, std::optional<State>>>> made_;  ///< by each aside
 };
 
-/// The state before each statement, and at last behind all, where `entry` holds at the entries of
-/// the flow. `apply(step, state)` makes what holds behind a statement. `join(state, other, by)`
-/// makes of a state one that holds for both, where ways come together; `by` names the aside that
-/// one of them leads through, empty: none. What it makes must come to rest. `also(state)` adds what
-/// comes in before every statement from elsewhere. A statement that nothing leads to follows the
-/// one above it.
+/// Computes the state before each statement, and the final state, from `entry` at the entries of
+/// the flow. `apply(step, state)` gives the state behind a statement. `join(state, other, by)`
+/// merges two states where paths meet; `by` names the aside on one of the paths (empty: none).
+/// Repeated merging must converge. `also(state)` adds effects from elsewhere before every
+/// statement. An unreachable statement follows the one above it.
 template <typename State, typename Apply, typename Join>
 [[nodiscard]] std::vector<State> states_before(
     const Flow& flow, const State& entry, const Apply& apply, const Join& join,
@@ -204,9 +204,9 @@ template <typename State, typename Apply, typename Join>
   return StatesBefore<State, Apply, Join>(flow, apply, join, also).find(entry);
 }
 
-/// The motions that may be the last before each statement, as `moves(step)` numbers them;
-/// kNoMotion where none comes before, or what moved the arm is no motion. `moves` is empty for a
-/// statement that does not move the arm.
+/// The possible last motions before each statement, numbered by `moves(step)`. kNoMotion means that
+/// there is none, or that the arm was moved by something other than a motion. `moves` is empty for
+/// a statement that does not move the arm.
 constexpr std::size_t kNoMotion = static_cast<std::size_t>(-1);
 [[nodiscard]] std::vector<std::set<std::size_t>> motions_before(
     const Flow& flow, const std::function<std::optional<std::size_t>(std::size_t step)>& moves);

@@ -20,23 +20,23 @@ namespace {
 constexpr double kWorthAPathsTurn = 0.98;     // of the sum of squared sigmas without
 constexpr double kLongerWay = 1.5;            // of a joint between two targets
 constexpr double kShortWay = from_deg(5);     // that any joint may have
-constexpr double kWayUnknown = from_deg(30);  // of a joint, where the one before is not known
+constexpr double kWayUnknown = from_deg(30);  // of a joint, if the previous one is not known
 
 /// The answer for a target with the tool turned.
 struct Outcome {
   std::string status, doubt;
   double sigma_mm = kNotKnown;
-  std::optional<JointVector> q;  ///< corrected; empty: it is left
+  std::optional<JointVector> q;  ///< corrected; empty: it stays unchanged
 };
 
 /// Targets that turn together, and the steps from one to the next.
 struct TurningPath {
   std::vector<std::size_t> targets;
   std::vector<std::pair<std::size_t, std::size_t>> steps;
-  bool stays = false;  ///< a target of it is left
+  bool stays = false;  ///< one of the targets stays unchanged
 };
 
-/// Joins numbers: each has a root that all that are joined share.
+/// Joins numbers. All joined numbers have a common root.
 class Joined {
  public:
   explicit Joined(std::size_t count) : parent_(count) {
@@ -57,7 +57,7 @@ std::vector<TurningPath> paths_of(const Program& program) {
   std::vector<std::pair<std::size_t, std::size_t>> steps;
   const auto is_pose = [&](std::size_t t) { return !is_joints(program.targets[t].coordinates); };
   std::optional<std::size_t> before;
-  std::vector<std::size_t> broken;  // targets beside one that is left
+  std::vector<std::size_t> broken;  // targets beside one that stays unchanged
   for (std::size_t m = 0; m < program.moves.size(); ++m) {
     const ProgramMove& move = program.moves[m];
     if (m > 0 && program.moves[m - 1].file != move.file) before.reset();
@@ -157,7 +157,7 @@ class Turning {
     return outcomes;
   }
 
-  /// The sum of squared sigmas; not a number where one is not known.
+  /// The sum of the squared sigmas; not a number if one of them is not known.
   static double spread(const TurningPath& path, const std::vector<Outcome>& outcomes) {
     double sum = 0;
     for (const std::size_t t : path.targets) {
@@ -166,7 +166,8 @@ class Turning {
     return sum;
   }
 
-  /// What another turn must be below: any is better than one that leaves a target.
+  /// The limit that another turn must stay below. Any turn is better than one that leaves a target
+  /// uncorrected.
   [[nodiscard]] double worth_turning(const TurningPath& path) const {
     const bool reached = std::all_of(path.targets.begin(), path.targets.end(),
                                      [&](std::size_t t) { return as_it_is_[t].q.has_value(); });

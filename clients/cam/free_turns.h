@@ -7,7 +7,7 @@
 #include "clients/cam/configuration.h"
 #include "clients/cam/lead_ins.h"
 
-/// The turn of each target about the tool's axis, where that is free.
+/// The turn of each target about the tool's axis, if that turn is free.
 namespace trammel::cam {
 
 struct FreeTurns {
@@ -15,11 +15,11 @@ struct FreeTurns {
   std::vector<double> deg;  ///< of each target
 };
 
-/// Turns poses to where the model knows most. Targets that lines and arcs join turn together, so
-/// that the tool keeps its way from one to the next; so do those of one motion. A path stays as it
-/// is where one of its targets is left, or would come near to a limit or a singular wrist, to
-/// another configuration than the program says, or with longer ways of the joints. Joint targets
-/// stay.
+/// Turns poses to the angle with the smallest uncertainty of the model. Targets that lines and arcs
+/// join turn together, so the tool keeps its way from one to the next. Targets of one motion also
+/// turn together. A path stays unchanged if one of its targets stays uncorrected. It also stays if
+/// a target would come near to a limit or a singular wrist, into another configuration than the
+/// program states, or with longer ways of the joints. Joint targets stay unchanged.
 [[nodiscard]] Result<FreeTurns> turn_freely(const Program& program, const ArmOfProgram& arm,
                                             const CellTools& cell, const AskCorrections& ask,
                                             const std::string& tool, const std::string& payload);

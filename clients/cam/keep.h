@@ -8,28 +8,29 @@
 #include "clients/cam/program.h"
 #include "clients/cam/scan.h"
 
-/// The way in which a reader keeps the places of what is written anew, for all dialects alike:
-/// numbers in their own digits, and texts that hold numbers.
+/// The way in which readers of all dialects record the places of values to rewrite: numbers in
+/// their own digits, and texts that contain numbers.
 namespace trammel::cam {
 
-/// A number as a token writes it; empty: it is none.
+/// The number in a token, in its written form; empty if the token is no number.
 [[nodiscard]] std::optional<WrittenNumber> number_in(const Token& token);
-/// Its value; 0: it is none.
+/// The value of the token; 0 if it is no number.
 [[nodiscard]] double value_in(const Token& token);
 /// The values of the numbers among tokens.
 [[nodiscard]] std::vector<double> values_in(const Tokens& tokens);
 
 [[nodiscard]] NumberStyle with_decimals(int decimals);
 
-/// Number `value` of a target is written anew where it stands, in the style that it has there.
+/// Records that number `value` of a target is rewritten in its place, in the style that it has
+/// there.
 void keep(Span place, std::size_t value, const NumberStyle& style, ProgramTarget& target);
-/// The number of a token likewise: it becomes the target's next one. False: the token is none.
+/// Records the number of a token likewise, as the target's next number. False if it has none.
 [[nodiscard]] bool keep(const Token& token, ProgramTarget& target);
-/// The first `count` of them. Returns why not; empty: it did.
+/// Records the first `count` numbers. Returns the reason if that fails; else empty.
 [[nodiscard]] std::string keep(const std::vector<Token>& numbers, std::size_t count,
                                ProgramTarget& target);
 
-/// A text that takes the place of an expression, with numbers of a target in it.
+/// A text that replaces an expression and contains numbers of a target.
 class NewText {
  public:
   NewText(Span place, std::string begin) : whole_{place, {std::move(begin)}, {}} {}
@@ -42,7 +43,7 @@ class NewText {
     whole_.texts.emplace_back();
     return *this;
   }
-  /// So many, from `first` on, with a text between.
+  /// Adds `count` numbers from `first` on, with a text between them.
   NewText& numbers(std::size_t first, std::size_t count, int decimals, const std::string& between);
   /// A line above the one of `at`.
   [[nodiscard]] NewLine line(std::size_t at) && {
@@ -58,8 +59,8 @@ class NewText {
   Rewrite whole_;
 };
 
-/// The bytes from the begin of a statement's line up to `at`; empty where something else than
-/// blanks stands before the statement.
+/// The bytes from the beginning of a statement's line up to `at`. Empty if anything but blanks
+/// precedes the statement.
 [[nodiscard]] std::string from_line_begin(const std::string& text, std::size_t statement,
                                           std::size_t at);
 
@@ -67,13 +68,14 @@ class NewText {
 void keep_original(const std::string& text, std::size_t at, const std::string& begin,
                    std::string original, ProgramTarget& target);
 
-/// Notes what is left, and why. Where a motion goes to it, that is number `move` of the program.
+/// Records an item that is left alone, and the reason. `move`: the number of the program's motion
+/// that goes to it.
 void leave(Program& program, LeftAlone left, std::optional<std::size_t> move = {});
 /// A position that no motion goes to.
 void leave_unused(Program& program, const std::string& name, std::size_t file, int line,
                   const std::string& in = "these files");
 
-/// A tool or frame that the controller's own lists tell.
+/// A tool or frame from the controller's own lists.
 struct ListedValue {
   Pose X = Pose::Identity();       ///< a tool from the flange, a frame as the controller has it
   std::optional<StatedLoad> load;  ///< of a tool
@@ -82,15 +84,15 @@ struct ListedValue {
   std::string why_not = {};  ///< why its value is not known; empty: it is
 };
 
-/// Those of all lists, by name, and which of them programs use.
+/// The values of all lists, by name, with a record of those that programs use.
 class ListedValues {
  public:
-  /// One that two lists have otherwise is not known.
+  /// Adds a value; if two lists differ, the value becomes unknown.
   void add(const std::string& name, ListedValue value);
   /// For a target; nullptr: no list has it.
   [[nodiscard]] const ListedValue* take(const std::string& name);
   [[nodiscard]] const std::map<std::string, ListedValue>& all() const { return all_; }
-  /// A sentence a list, of what was taken from it.
+  /// One sentence per list about the values taken from it.
   [[nodiscard]] std::vector<std::string> notes() const;
 
  private:

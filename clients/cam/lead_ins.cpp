@@ -6,7 +6,7 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr double kWorthALeadIn = 0.9;  // of the error without
+constexpr double kWorthALeadIn = 0.9;  // of the error without a lead-in
 
 }  // namespace
 

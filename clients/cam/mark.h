@@ -10,13 +10,13 @@ namespace trammel::cam {
 
 struct Mark {
   std::string model;     ///< id
-  std::string version;   ///< of this program
+  std::string version;   ///< version of this software
   std::string date;      ///< 2026-11-22
   std::string original;  ///< first 16 digits of the SHA-256 of the bytes before (UTF-16: as UTF-8)
 };
 
 [[nodiscard]] std::string short_hash(std::string_view bytes);
-/// The words of a mark, to be put into comments in this order.
+/// The words of a mark, in their order in comments.
 [[nodiscard]] std::vector<std::string> words_of(const Mark& mark);
 /// The mark of a text in any dialect; empty where there is none.
 [[nodiscard]] std::optional<Mark> find_mark(std::string_view text);

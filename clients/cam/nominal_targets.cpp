@@ -68,7 +68,7 @@ class Finding {
     }
   }
 
-  /// Points that no motion goes to are nothing that is left uncorrected.
+  /// Notes points without any motion to them. They do not count as uncorrected.
   void note_unused() {
     constexpr std::size_t kMost = 5;
     std::vector<std::string> points;
@@ -85,7 +85,8 @@ class Finding {
                     fmt::join(points, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
   }
 
-  /// External axes that the cell has no rail for: the robot stands still only where they do.
+  /// Finds external axes that are not the cell's rail and that move: the robot stands still only if
+  /// they do.
   void find_moving_axes() {
     std::map<int, std::set<double>> values;
     for (const ProgramTarget& target : program_.targets) {
@@ -104,7 +105,7 @@ class Finding {
                   [&](int axis) { return cell_.idle_axes.contains(axis_called(program_, axis)); });
   }
 
-  /// Where a motion leaves the arm.
+  /// The posture in which a motion leaves the arm.
   struct Stand {
     std::optional<JointVector> q;  ///< empty: not known
     bool posture_only = false;     ///< somewhere on a line from there
@@ -156,7 +157,7 @@ class Finding {
     changed_ = true;
   }
 
-  /// Where it may begin, as far as that is found already.
+  /// The postures in which it may begin, as far as they are found already.
   [[nodiscard]] std::vector<Stand> stands_before(const ProgramMove& move) const {
     std::vector<Stand> from;
     for (const std::size_t m : move.before) {
@@ -167,8 +168,8 @@ class Finding {
     return from;
   }
 
-  /// Finds the joints of a target. A configuration that it does not say follows from the motion
-  /// before in this file, wherever the targets stand.
+  /// Finds the joints of a target. An unspecified configuration follows from the previous motion in
+  /// this file, wherever the targets are.
   void by_configuration(std::size_t t, std::size_t file) {
     std::optional<JointVector>& previous = last_[file];
     if (!done_[t] && !previous) note_beginning(t);
@@ -177,7 +178,7 @@ class Finding {
     if (found_.targets[t].q) previous = found_.targets[t].q;
   }
 
-  /// Where a program begins without saying it, the robot stays in the posture that it stands in.
+  /// If a program does not state its first posture, the robot starts in its present posture.
   void note_beginning(std::size_t t) {
     const ProgramTarget& target = program_.targets[t];
     const bool may_say_it = program_.dialect == "krl" || program_.dialect == "inform";
@@ -191,8 +192,8 @@ class Finding {
         shown(target.name), program_.files[target.file].name, target.line));
   }
 
-  /// A target whose joints the controller chooses by those before it. All ways to it must lead to
-  /// the same.
+  /// Finds the joints of a target that the controller chooses by the previous joints. All paths to
+  /// it must give the same result.
   void find_open(std::size_t t, const ProgramMove& move, std::vector<Stand> from) {
     if (!move.near.empty())
       from = {{arm_.from_axes(in_degrees(Coordinates::kJointRadians, move.near), {})}};
@@ -226,8 +227,8 @@ class Finding {
                     shown(target.name), program_.files[target.file].name, target.line));
   }
 
-  /// Branches by number are placeholders where lines pass over them; status and turns are what was
-  /// stored.
+  /// Notes targets whose stored status or turns differ; on a line, branch numbers are placeholders
+  /// that the controller ignores.
   void note_other_status(std::size_t t, const JointVector& before) {
     const Configuration& stored = program_.targets[t].configuration;
     NominalTarget& target = found_.targets[t];
@@ -248,7 +249,7 @@ class Finding {
            kSameJoints;
   }
 
-  /// True if there is a pose whose joints are to be found; joints are taken as they stand.
+  /// True if there is a pose whose joints must be found; joint targets need no search.
   bool prepare(std::size_t t) {
     const ProgramTarget& target = program_.targets[t];
     const ToolChoice& choice = found_.tools[target.tool];
@@ -300,7 +301,7 @@ class Finding {
       found.asked.seed_rad = exchange::asked_from_si(*joints.q, exchange::rails_of(arm_.robot()));
       found.q = *joints.q;
       if (outside(*joints.q) && joints.conf && !arm_.has_rail()) {
-        // So that the answer names the branches that would reach it.
+        // Without a seed, so that the answer names the branches that would reach it.
         found.asked.seed_rad.clear();
         found.asked.conf = joints.conf;
       }

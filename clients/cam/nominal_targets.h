@@ -16,7 +16,7 @@ struct NominalTarget {
   exchange::AskedTarget asked;   ///< as a model is asked to correct it
   std::optional<JointVector> q;  ///< the controller's joints; empty: not found
   std::string why_not;           ///< why it cannot be corrected; empty: it may be
-  std::string doubt = {};        ///< what the program says of it that contradicts itself
+  std::string doubt = {};        ///< the contradiction in its configuration
 };
 
 struct NominalTargets {
@@ -25,15 +25,15 @@ struct NominalTargets {
   std::vector<std::string> notes;
 };
 
-/// Where motions command axes, and no pose depends on the tool: which tool of the cell is it?
+/// The choice of the tool if motions command axes, and no pose depends on the tool.
 enum class BareTools {
   kAsInTheProgram,
-  kOfTheCell  ///< the one that is asked for, or the cell's only one: measuring programs leave it to
-              ///< the controller
+  kOfTheCell  ///< the requested one, or the cell's only one: measuring programs leave it to the
+              ///< controller
 };
 
-/// In the order of the motions, since one motion may leave its configuration to the one before.
-/// Refuses what choose_tools() refuses, and files that check_files() refuses.
+/// The targets in the order of the motions, since a motion may leave its configuration to the
+/// previous one. Refuses the same as choose_tools() and check_files().
 [[nodiscard]] Result<NominalTargets> nominal_targets(const Program& program,
                                                      const ArmOfProgram& arm, const CellTools& cell,
                                                      const std::string& tool,
@@ -45,8 +45,8 @@ enum class BareTools {
                                               const CellTools& cell, const NominalTargets& nominal,
                                               std::size_t target);
 
-/// Targets of one tool and payload of the cell, to be asked for together; those that cannot be
-/// corrected left out.
+/// Targets with one tool and payload of the cell, for one request, without those that cannot be
+/// corrected.
 struct TargetGroup {
   std::string tool, payload;
   std::vector<std::size_t> targets;

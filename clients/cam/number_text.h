@@ -7,7 +7,7 @@
 /// Numbers as programs write them: `-.384`, `+1800.`, `9E+09`.
 namespace trammel::cam {
 
-/// The style of a number, so that another value can be written the same way.
+/// The style of a number, for writing another value in the same style.
 struct NumberStyle {
   int decimals = 0;            ///< digits behind the point (of the mantissa)
   bool plus = false;           ///< positive numbers carry a sign
@@ -27,8 +27,8 @@ struct WrittenNumber {
 
 /// Half a unit of the last digit that `style` writes of `value`.
 [[nodiscard]] double rounding_of(double value, const NumberStyle& style);
-/// `style` with so many decimals more that rounding_of() is at most `largest`; ten decimals at
-/// most.
+/// `style` with enough additional decimals that rounding_of() is at most `largest`. It has ten
+/// decimals at most.
 [[nodiscard]] NumberStyle with_rounding(double value, NumberStyle style, double largest);
 [[nodiscard]] std::string number_text(double value, const NumberStyle& style);
 

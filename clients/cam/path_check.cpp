@@ -26,7 +26,7 @@ JointVector joints_of(const ReceiptRow& row, const Chain& robot, const JointVect
 
 struct SpeedLimit {
   double mm_s = kNotKnown;
-  int joint = -1;  ///< that reaches its limit first
+  int joint = -1;  ///< the joint that reaches its limit first
 };
 
 SpeedLimit speed_limit(const Chain& robot, const JointVector& from, const JointVector& to,
@@ -53,7 +53,7 @@ class Path {
     for (const ProgramMove& move : program_.moves) {
       if (last != nullptr && last->file != move.file) before = nullptr;
       last = &move;
-      // An arc has two targets; more are one of an array, whichever a variable says.
+      // An arc has two targets. More targets are elements of an array, and a variable selects one.
       if (move.targets.empty() || move.targets.size() > 2) {
         before = nullptr;
         continue;

@@ -9,7 +9,7 @@
 #include "clients/cam/receipt.h"
 #include "server/exchange/answer.h"
 
-/// Where the tool really goes with a program as it is.
+/// The true path of the tool in an unchanged program.
 namespace trammel::cam {
 
 /// Predicts the error at joints with one tool and payload. All answers of one program come from one
@@ -36,8 +36,7 @@ struct PredictedProgram {
   std::vector<std::string> notes;
 };
 
-/// A corrected program is predicted as it is. Refuses what choose_tools() refuses and what `ask`
-/// refuses.
+/// Predicts a program, corrected or not, as it is. Refuses the same as choose_tools() and `ask`.
 [[nodiscard]] Result<PredictedProgram> predict_program(const Program& program, const Chain& robot,
                                                        const CellTools& cell,
                                                        const AskPredictions& ask,

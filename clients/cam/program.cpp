@@ -20,8 +20,8 @@ double near_turn(double angle, double like) {
   return angle + 360 * std::round((like - angle) / 360);
 }
 
-/// The nearer to `like` of the two ways to write a rotation. Where the middle angle is ±90 deg
-/// only a sum of the others is given: the first stays.
+/// The nearer to `like` of the two angle triples of a rotation. If the middle angle is ±90 deg,
+/// only a sum of the other two is determined: the first one stays.
 Eigen::Vector3d nearest_zyx(const Matrix3& R, const Eigen::Vector3d& like) {
   Eigen::Vector3d one = to_deg(1.0) * zyx_angles(R);
   if (is_beta_upright(R)) {
@@ -151,7 +151,7 @@ std::string called(const ProgramTool& tool) {
 
 namespace {
 
-/// Takes the targets out of the program that `leave` says; motions go to the others.
+/// Removes the targets marked in `leave`; motions go to the others.
 void remove_targets(Program& program, const std::vector<bool>& leave) {
   std::vector<std::size_t> now(program.targets.size());
   std::vector<ProgramTarget> kept;

@@ -10,14 +10,13 @@
 #include "clients/cam/number_text.h"
 #include "server/robot/cell.h"
 
-/// A robot program, whatever controller it is for: files of bytes, and what was understood of them.
-/// A reader of a dialect makes it; everything behind the readers is the same for all dialects.
-/// Bytes that no reader understood stay.
+/// A robot program for any controller: the bytes of its files, and the parts that were understood.
+/// A reader for each dialect makes it; all later steps are the same for all dialects. Bytes that
+/// the reader did not understand stay unchanged.
 namespace trammel::cam {
 
 struct SourceFile {
-  std::string
-      name;  ///< as the receipt shows it: a path, relative to the folder that was handed over
+  std::string name;  ///< in the form of the receipt: a path relative to the given folder
   std::string text;  ///< the bytes, in whatever encoding
 };
 
@@ -50,9 +49,9 @@ struct Rewrite {
   std::vector<Slot> slots;
 };
 
-/// A line that is written above one of the text: texts[0] slots[0] texts[1] ... texts[n].
+/// A line to insert above a line of the text: texts[0] slots[0] texts[1] ... texts[n].
 struct NewLine {
-  std::size_t at = 0;  ///< a byte of the line that it goes above
+  std::size_t at = 0;  ///< a byte of the line below it
   std::vector<std::string> texts;
   std::vector<Slot> slots;
 };
@@ -61,10 +60,10 @@ constexpr char kNewPoint = '\x01';
 
 /// The numbered points of a file.
 struct PointList {
-  std::size_t next = 0;     ///< a number that none has, nor any higher one
-  int width = 1;            ///< digits of a number, at least
-  Span count = {};          ///< the bytes that say how many there are; empty: none do
-  std::size_t counted = 0;  ///< what they say
+  std::size_t next = 0;     ///< a number above all numbers in the file
+  int width = 1;            ///< least number of digits
+  Span count = {};          ///< the bytes with the number of points; empty: there are none
+  std::size_t counted = 0;  ///< the number in these bytes
 };
 
 /// The arm's configuration at a target, as a program states it. Candidates are the closed-form
@@ -72,13 +71,14 @@ struct PointList {
 struct Configuration {
   std::optional<int> conf;  ///< 0..7 as inverse_kinematics.h numbers it
   std::vector<std::optional<double>>
-      near;  ///< rad, a value of each joint to be near to; empty: not said
+      near;  ///< rad, a value of each joint to be near to; empty if not stated
   std::vector<std::optional<int>>
       turns;  ///< of each joint: 0 within ±180 deg, 1 a turn above, -1 below
-  std::vector<std::optional<int>> signs;  ///< of each joint: -1 negative, +1 not; empty: not said
+  std::vector<std::optional<int>> signs;  ///< of each joint: -1 negative, +1 not; empty if not
+                                          ///< stated
   std::optional<bool> behind_axis_1;      ///< wrist centre behind axis 1
   std::optional<bool> elbow_up;           ///< the higher of the two elbows
-  std::optional<bool> larger_joint_3;     ///< of the two elbows the one with the larger joint 3
+  std::optional<bool> larger_joint_3;  ///< true: of the two elbows the one with the larger joint 3
   std::optional<bool>
       bends_down;  ///< with joint 4 near zero the wrist would bend the tool downward
 
@@ -92,37 +92,37 @@ struct Configuration {
 struct StatedLoad {
   double mass = 0;                ///< kg
   Vector3 p_F = Vector3::Zero();  ///< centre of gravity, m, in F
-  bool has_centre = true;         ///< false: only the mass is said
+  bool has_centre = true;         ///< false: only the mass is stated
 };
 
-/// A tool as the program has it.
+/// A tool in the form in which the program has it.
 struct ProgramTool {
   std::string name;
   std::string file;  ///< empty: not in the files handed over
   int line = 0;
   std::optional<Pose> X_FT;  ///< empty: not known
   std::optional<StatedLoad> load;
-  double rotation_rounding = 0;  ///< rad, what its digits leave open
+  double rotation_rounding = 0;  ///< rad, the rounding of its digits
   std::string why_not;           ///< why its targets cannot be corrected; empty: they can
   std::string carries =
       {};  ///< the load that motions set, as the program calls it; empty: `load` is the tool's own
   std::string load_note = {};  ///< why that load cannot be compared
-  std::string row = {};        ///< of --frames, that may tell X_FT; empty: none may
-  bool from_row = false;       ///< X_FT is what that row says
+  std::string row = {};        ///< the row of --frames that may give X_FT; empty: none may
+  bool from_row = false;       ///< X_FT comes from that row
 };
 
-/// A frame that targets are given in. A reader tells it as seen from the controller's world;
-/// read_program() makes it seen from the robot's base.
+/// A frame of targets. A reader gives it in the controller's world; read_program() converts it into
+/// the robot's base.
 struct ProgramFrame {
   std::string name;
   Pose X_BO = Pose::Identity();
   std::string why_not;   ///< why its targets cannot be corrected; empty: they can
-  std::string row = {};  ///< of --frames, that may tell X_BO; empty: none may
+  std::string row = {};  ///< the row of --frames that may give X_BO; empty: none may
   bool in_base =
-      false;  ///< the reader has it seen from the robot's base already, as rows of --frames are
+      false;  ///< the frame is already relative to the robot's base, as rows of --frames are
 };
 
-/// Where the robot stands in the controller's world, and who says so.
+/// The robot's place in the controller's world, and its origin.
 struct StatedBase {
   Pose X_WB;
   std::string name;  ///< `$ROBROOT`
@@ -130,8 +130,7 @@ struct StatedBase {
   int line = 0;  ///< 0: not a line of a file
 };
 
-/// A number of a robot that its controller's files state, so that another robot than the cell's is
-/// found out.
+/// A number of a robot in its controller's files, which reveals a robot other than the cell's.
 enum class ArmNumber {
   kAxes,
   kHeightOfAxis2,
@@ -168,16 +167,16 @@ struct StatedCoupling {
 /// A target that may be corrected.
 struct ProgramTarget {
   std::string name;          ///< `p10`, or how it is computed: `Offs(p10,0,0,50)`
-  std::size_t file = 0;      ///< where it is written anew
-  int line = 0;              ///< of that place, from 1
+  std::size_t file = 0;      ///< the place to rewrite
+  int line = 0;              ///< the line of that place, from 1
   std::string motion;        ///< `MoveL`, of its first use
-  std::vector<int> used_at;  ///< lines of the motions to it, in the file of each
+  std::vector<int> used_at;  ///< lines of the motions to it, in each motion's file
   std::size_t tool = 0, frame = 0;
   Coordinates coordinates = Coordinates::kQuaternion;
   std::vector<double> numbers;  ///< of the whole pose, in the dialect's units
   Configuration configuration = {};
   std::map<int, double> external;           ///< mm or deg as stated, by axis from 0
-  std::vector<double> pulses_per_deg = {};  ///< of each axis, where its numbers are pulses
+  std::vector<double> pulses_per_deg = {};  ///< for each axis, if its numbers are pulses
   std::vector<Rewrite> rewrites;
   bool folded = false;  ///< was computed by the program from other targets
   std::string comment;  ///< a line to insert above `comment_at`, without its end; empty: none
@@ -185,7 +184,7 @@ struct ProgramTarget {
   bool linear = false;         ///< the tool's path to it is a line or an arc
 };
 
-/// A target that is left as it was.
+/// A target that is left alone.
 struct LeftAlone {
   std::string name;
   std::size_t file = 0;
@@ -194,10 +193,10 @@ struct LeftAlone {
   std::string why;
 };
 
-/// By what a controller chooses among the joints that bring the tool to a pose.
+/// The criterion by which a controller chooses among the joints that bring the tool to a pose.
 enum class JointChoice {
-  kByConfiguration,  ///< as the target says it
-  kNearest,          ///< to joints that the motion names, or to those before it
+  kByConfiguration,  ///< the configuration in the target
+  kNearest,          ///< nearest to joints in the motion, or to the previous joints
   kOnALine           ///< the posture before stays
 };
 
@@ -205,35 +204,36 @@ enum class JointChoice {
 struct ProgramMove {
   std::size_t file = 0;
   int line = 0;
-  std::vector<std::size_t> targets;  ///< of Program::targets, that it may go to; empty: left alone
+  std::vector<std::size_t> targets;  ///< indices in Program::targets to which it may go; empty:
+                                     ///< left alone
   bool is_arc = false;               ///< to an end by way of another target
-  bool arc_goes_on = false;          ///< it is part of the arc of the motion before
-  bool left_some = false;            ///< a target of it is left
-  std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
+  bool arc_goes_on = false;          ///< it is part of the arc of the previous motion
+  bool left_some = false;            ///< a target of it is left alone
+  std::optional<double> speed_mm_s = {};  ///< of the tool, if the motion states it
   JointChoice choice = JointChoice::kByConfiguration;
   std::vector<double> near = {};  ///< rad, joints that the motion names; empty: none
   std::vector<double> axes =
-      {};  ///< deg, where it commands axes, also where these are left; empty: it does not
+      {};  ///< deg, if it commands axes, even where these are left alone; empty: it does not
   std::set<std::size_t> before =
       {};  ///< motions that may be the last before it, as motions_before() has them
-  /// Lines that make one more motion of its kind before it, to a place in the coordinates of its
-  /// target; empty: it does not stop at its target, or cannot be repeated.
+  /// Lines for an additional motion of the same kind before it, to a place in the coordinates of
+  /// its target. Empty if the motion does not stop at its target, or cannot be repeated.
   std::vector<NewLine> another = {};
 };
 
-/// A statement reads the stored numbers of a target: what it makes of them moves where the target
-/// is corrected.
+/// A statement that reads the stored numbers of a target: its result moves when the target is
+/// corrected.
 struct Reading {
   std::size_t file = 0;
   Span of;           ///< the bytes that hold the target
   std::string name;  ///< of the target
   std::size_t by_file = 0;
   int by_line = 0;
-  std::string by;       ///< what is made of it: `pX`; empty: something else
-  bool motion = false;  ///< it is a motion, which goes to what is made of it
+  std::string by;       ///< its result: `pX`; empty: another kind of result
+  bool motion = false;  ///< it is a motion, which goes to the result
 };
 
-/// Which way a program says that up is, as its robot is mounted.
+/// The upward direction according to the program's mounting of the robot.
 struct StatedUp {
   Vector3 up_B = Vector3::UnitZ();  ///< unit vector, seen from the robot's base
   std::string name;                 ///< `set_gravity`
@@ -248,7 +248,7 @@ struct Cut {
   std::string what;  ///< a clause: `PROC main has no ENDPROC`
 };
 
-/// Where and how a dialect takes the mark of a correction.
+/// The place and the form of the correction mark in a dialect.
 struct MarkPlace {
   std::size_t at = 0;       ///< first byte of the line that it goes above
   std::string begin = "!";  ///< of the comment
@@ -269,7 +269,7 @@ struct Program : StatedRobot {
   std::string dialect;
   std::vector<SourceFile> files;
   std::vector<MarkPlace> mark_places;  ///< one a file
-  std::vector<PointList> points;       ///< likewise, where its points are numbered; else empty
+  std::vector<PointList> points;       ///< likewise, if its points are numbered; else empty
   std::vector<ProgramTool> tools;
   std::vector<ProgramFrame> frames;
   std::vector<ProgramTarget> targets;
@@ -277,10 +277,10 @@ struct Program : StatedRobot {
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
   std::set<int> moved_axes;        ///< external axes that motions move without a target
-  std::vector<std::string> notes;  ///< what could not be compared, a sentence each
+  std::vector<std::string> notes;  ///< values that could not be compared, one sentence each
   std::vector<Cut> cuts;
 
-  /// True if any motion or target was seen in any of the files, be it one that is left as it is.
+  /// True if any motion or target was seen in any of the files, even one that is left alone.
   [[nodiscard]] bool is_understood() const {
     return !(moves.empty() && targets.empty() && left.empty());
   }
@@ -294,19 +294,18 @@ struct ReadOptions {
   std::set<std::string> spared = {};  ///< files that are read and not written
   std::vector<std::string> idle_axes =
       {};                   ///< external axes that carry neither robot nor part, by axis_called()
-  StatedRobot stated = {};  ///< by files that are no programs
+  StatedRobot stated = {};  ///< from files that are not programs
   std::vector<SourceFile> beside =
-      {};  ///< read for what they say of values: other tasks, system variables
+      {};  ///< files read only for their values: other tasks, system variables
   std::vector<double> pulses_per_deg =
       {};  ///< of each axis, as the controller counts them; empty: not told
 };
 
 /// Refuses files in UTF-16, lines that end in CR alone (readers count by LF, and comments end with
-/// it), and a file that was cut off, whose missing part may decide what the rest means.
+/// it), and a truncated file, whose missing part may decide the meaning of the rest.
 [[nodiscard]] Status check_files(const Program& program);
 
-/// The row of --frames that tells where the robot stands in the world that the program's frames are
-/// told in.
+/// The row of --frames with the robot's place in the world of the program's frames.
 constexpr const char* kRobotBase = "robot_base";
 
 /// `[0.000, 0.000, 600.000] mm [1.000000, 0.000000, 0.000000, 0.000000]`
@@ -314,48 +313,48 @@ constexpr const char* kRobotBase = "robot_base";
 /// `2.500 mm and 0.0000 deg apart`
 [[nodiscard]] std::string apart_text(const Pose& a, const Pose& b);
 
-/// True if both are the same place and turn, as far as tools and frames are compared.
+/// True if both are the same place and turn, within the tolerance for tools and frames.
 [[nodiscard]] bool same_place(const Pose& a, const Pose& b);
-/// Why a row of --frames cannot hold beside what the files say at a place, both seen from the same;
-/// empty: it can.
+/// The contradiction between a row of --frames and the files at one place, both in the same frame;
+/// empty: none.
 [[nodiscard]] std::string against_row(const std::string& row, const Pose& X, const Pose& by_files,
                                       const std::string& place);
 
-/// Gives a tool or frame the value of a row of --frames, which it may have. Whether there is such a
-/// row.
+/// Gives a tool or frame the value of its row in --frames. Returns whether the row exists.
 bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool);
 bool take_row(const std::string& row, const ReadOptions& options, ProgramFrame& frame);
 
-/// Names of rows of --frames: those whose values a program has, and those that it still lacks.
+/// Names of rows of --frames: those whose values the program has, and those that are still missing.
 struct FramesRows {
   std::set<std::string> used, open;
 };
 [[nodiscard]] FramesRows rows_of(const Program& program);
 
-/// The number of a tool in the program's list, where it is put if no tool of that name, place and
-/// load is there.
+/// The number of a tool in the program's list. The tool is added if the list has no tool with that
+/// name, place and load.
 std::size_t add_once(Program& program, ProgramTool tool);
-/// The number of a frame in the program's list, where it is put if no frame of that name, whatever
-/// its case, and pose is there.
+/// The number of a frame in the program's list. The frame is added if the list has no frame with
+/// that pose and that name in any case.
 std::size_t add_once(Program& program, ProgramFrame frame);
 /// `spindle`, `spindle carrying lPart`
 [[nodiscard]] std::string called(const ProgramTool& tool);
-/// Leaves the targets that stand in files of these names: those that a motion goes to are told,
-/// with the reason.
+/// Leaves the targets in files of these names alone; those with a motion are reported with the
+/// reason.
 void leave_targets_in(Program& program, const std::set<std::string>& files);
-/// Leaves the other target of each arc that one is left of: half an arc corrected is another arc.
+/// Leaves the second target of an arc alone if the first one is: correcting half an arc makes
+/// another arc.
 void leave_halves_of_arcs(Program& program);
 
-/// The first of Yaskawa's external axes, in pulses: those that carry the robot, and behind them
-/// those that carry the part.
+/// The first of Yaskawa's external axes, in pulses: first those that carry the robot, then those
+/// that carry the part.
 constexpr int kFirstBaseAxis = 6, kFirstStationAxis = 12;
 /// True if the robot stands elsewhere as soon as the axis is not at zero.
 [[nodiscard]] bool carries_robot(const Program& program, int axis);
 /// An external axis as a person calls it: `external axis b`, `group 2, axis 1` (FANUC), `base axis
 /// 1` (Yaskawa).
 [[nodiscard]] std::string axis_called(const Program& program, int axis);
-/// Takes axes out of the targets that carry neither robot nor part, called as axis_called() does.
-/// Refuses a name that no axis of the program has.
+/// Removes axes that carry neither robot nor part from the targets. `names` are as axis_called()
+/// gives them. Refuses a name that no axis of the program has.
 [[nodiscard]] Status take_idle_axes(Program& program, const std::vector<std::string>& names);
 
 /// The number of the line of a byte, from 1.
@@ -363,7 +362,7 @@ constexpr int kFirstBaseAxis = 6, kFirstStationAxis = 12;
 /// The first byte of the line that `at` is in.
 [[nodiscard]] std::size_t line_begin(const std::string& text, std::size_t at);
 
-/// The pose that the numbers say, in the target's frame. Joints have none.
+/// The pose that the numbers describe, in the target's frame. Joints have none.
 [[nodiscard]] Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers);
 /// The reverse; angles and quaternions nearest to `like`, the numbers that it replaces.
 [[nodiscard]] std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose,

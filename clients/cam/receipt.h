@@ -18,22 +18,23 @@ struct ReceiptRow {
   std::string name, file, motion, tool, frame;
   int line = 0;
   std::vector<int> used_at;
-  std::string status;  ///< `ok`, `out_of_domain`, ...; `refused` where the program leaves it open
+  std::string status;  ///< `ok`, `out_of_domain`, ...; `refused` if the program does not determine
+                       ///< it
   std::string message, suggestion;
   Coordinates coordinates = Coordinates::kQuaternion;
   std::vector<double> before,
       after;  ///< numbers of the file, in its units; `after` as written, empty: left alone
-  std::vector<double> joints;  ///< deg, mm: what the controller will take; empty: left alone
+  std::vector<double> joints;  ///< deg, mm: the joints that the controller will take; empty: left
+                               ///< alone
   double error_before_mm = kNotKnown, error_after_mm = kNotKnown;
   double sigma_mm = kNotKnown;           ///< of the true error, per axis
   double sigma_measured_mm = kNotKnown;  ///< of one measurement
-  double rounding_mm = kNotKnown;        ///< distance of what is written from what was computed
+  double rounding_mm = kNotKnown;        ///< distance between the written and the computed target
   int iterations = 0;
   int lead_in = 0;        ///< motions that were inserted before each motion to it
-  double turned_deg = 0;  ///< about the tool's axis, where that is free
+  double turned_deg = 0;  ///< about the tool's axis, if that turn is free
   bool folded = false;
-  bool moves_along =
-      false;  ///< it is left as it was, and moves all the same: with a target that is corrected
+  bool moves_along = false;  ///< it is unchanged in the file, but moves with a corrected target
   /// Speed of the tool at which the first axis reaches its limit on the way from the target before;
   /// see path_check.h.
   double path_limit_before_mm_s = kNotKnown, path_limit_after_mm_s = kNotKnown;

@@ -15,7 +15,7 @@ class Scanner {
 
   void read(Tokens& tokens) {
     std::size_t last_end = 0;
-    bool is_value = false;  // what stands before
+    bool is_value = false;  // of the token before
     while (skip_blanks()) {
       const Token token = next(is_value && last_end == at_);
       last_end = token.end;
@@ -24,7 +24,7 @@ class Scanner {
     }
     tokens.set_end(at_, line_);
   }
-  /// Where the last comment began.
+  /// The start of the last comment.
   [[nodiscard]] std::size_t comment() const { return comment_; }
 
  private:

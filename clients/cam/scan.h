@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-/// The scanner by which the bytes of a program fall into words, numbers, texts and signs, each with
-/// its place. One scanner serves all dialects. What differs between them is a Lexis.
+/// The scanner that splits the bytes of a program into words, numbers, texts and signs, each with
+/// its place. One scanner serves all dialects; a Lexis has their differences.
 namespace trammel::cam {
 
 enum class TokenKind : unsigned char { kWord, kNumber, kText, kSign, kEnd };
@@ -34,13 +34,13 @@ struct Lexis {
   std::string_view
       quotes;  ///< each of them encloses a text, which ends with its line at the latest
   bool doubled_quotes = false;     ///< two quotes in a text stand for one
-  bool numbers_have_signs = true;  ///< where no value stands before the sign
+  bool numbers_have_signs = true;  ///< if no value precedes the sign
   bool dollar_is_letter = true;
   std::string_view long_sign = {};  ///< a sign of two bytes; empty: there is none
 };
 
-/// Tokens one after the other, of a text that outlives them. Before the first and behind the last
-/// stands an empty one, however far one asks.
+/// The tokens of a text in their order. The text outlives them. Every place before the first token
+/// and behind the last holds an empty token.
 class Tokens {
  public:
   Tokens() = default;
@@ -58,12 +58,12 @@ class Tokens {
   /// The number of the first that is `wanted`, from one on; size(): there is none.
   [[nodiscard]] std::size_t find(std::string_view wanted, std::size_t from = 0) const;
   [[nodiscard]] bool has(std::string_view wanted) const { return find(wanted) < size(); }
-  /// Those from `first` on, up to `last`.
+  /// The tokens from `first` up to `last`.
   [[nodiscard]] Tokens part(std::size_t first, std::size_t last) const;
 
   void add(const Token& token);
   void reserve(std::size_t count) { marks_.reserve(count); }
-  /// Where the scanning ended.
+  /// Sets the end of the scanned text.
   void set_end(std::size_t at, int line) {
     end_ = at;
     end_line_ = line;
@@ -102,10 +102,10 @@ class Tokens {
 /// The tokens of text[begin, end). `line`: of `begin`.
 [[nodiscard]] Tokens tokens_of(std::string_view text, std::size_t begin, std::size_t end, int line,
                                const Lexis& lexis);
-/// Those of a whole file.
+/// The tokens of a whole file.
 [[nodiscard]] Tokens tokens_of(std::string_view text, const Lexis& lexis);
 
-/// A line of a file, without what ends it.
+/// A line of a file, without its line end.
 struct TextLine {
   std::size_t begin = 0, end = 0;
   int number = 1;
@@ -118,11 +118,11 @@ struct TokenLine {
   std::size_t begin = 0, end = 0;
   int number = 1;
   Tokens tokens;            ///< without the comment
-  std::size_t comment = 0;  ///< where that begins; `end`: there is none
+  std::size_t comment = 0;  ///< the start of the comment; `end`: there is none
 };
 [[nodiscard]] std::vector<TokenLine> token_lines(std::string_view text, const Lexis& lexis);
 
-/// The first byte of a file behind what says how its letters are encoded.
+/// The first byte of a file behind its byte order mark.
 [[nodiscard]] std::size_t first_byte(std::string_view text);
 
 }  // namespace trammel::cam

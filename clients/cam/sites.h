@@ -10,7 +10,7 @@
 
 namespace trammel::cam {
 
-/// A motion goes to a place with this tool in this frame.
+/// A motion to a place, with its tool and its frame.
 struct SiteUse {
   std::size_t tool = 0, frame = 0;
   std::string motion;
@@ -20,23 +20,23 @@ struct SiteUse {
   bool linear = false;
 };
 
-/// Bytes that hold a target, and what uses them.
+/// The bytes of a target, and their uses.
 struct Site {
   std::size_t file = 0, begin = 0;
   std::string name;
   std::vector<SiteUse> uses;
 };
 
-/// The places that motions of a program go to. One that is used with several tools or frames is
-/// told apart.
+/// The target places of a program's motions. A place with several tools or frames is recorded once
+/// for each.
 class Sites {
  public:
   void add(std::size_t file, std::size_t begin, const std::string& name, SiteUse use);
 
-  /// Says what stands at a site: fills coordinates, numbers, configuration, rewrites. Returns why
-  /// it cannot be corrected; empty: it can.
+  /// Describes the target at a site: fills coordinates, numbers, configuration, rewrites. Returns
+  /// the reason why it cannot be corrected; empty: it can.
   using Describe = std::function<std::string(const Site& site, ProgramTarget& target)>;
-  /// Adds a target to the program for each site, or what is left and why.
+  /// Adds a target to the program for each site, or an item left alone with its reason.
   void finish(Program& program, const Describe& describe) const;
 
  private:

@@ -18,7 +18,7 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr double kSameLength = 1e-4;  // m: both are the drawing's
+constexpr double kSameLength = 1e-4;  // m: both lengths come from the drawing
 constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
 constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
 constexpr double kSameUp = 0.09;      // rad: 5 deg
@@ -206,7 +206,7 @@ bool is_kuka_type(const std::string& theirs, const std::string& ours) {
   });
 }
 
-/// FANUC's and Yaskawa's types are the name of the robot without its maker's.
+/// FANUC's and Yaskawa's types are the name of the robot without the maker's name.
 bool is_plain_type(const std::string& theirs, const std::string& ours) {
   std::string name = ours;
   for (const char* maker : {"FANUC ", "YASKAWA ", "MOTOMAN "})

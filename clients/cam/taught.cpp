@@ -13,11 +13,12 @@ namespace {
 
 constexpr std::size_t kFewestPositions = 4;  // poses that show a habit
 constexpr std::size_t kMost = 500;           // nobody jogs to more
-constexpr double kStep = 0.5;                // mm: plain coordinates are multiples of it
+constexpr double kStep = 0.5;                // mm: coordinates of drawn targets are multiples of it
 constexpr double kSame = 1e-4;               // mm: below any written digit
 constexpr double kSameRotation = 5e-5;       // rad: a jogged wrist comes back to 1e-4 at best
 constexpr double kNearest = 20;     // mm: paths of CAM systems have their points closer together
-constexpr std::size_t kTenth = 10;  // of the poses, or one, may look drawn by chance
+constexpr std::size_t kTenth = 10;  // share of the poses, or one pose, that may look drawn by
+                                    // chance
 
 bool is_plain(double mm) { return std::abs(mm - kStep * std::round(mm / kStep)) < kSame; }
 

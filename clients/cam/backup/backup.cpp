@@ -97,8 +97,8 @@ class Backup {
         .next(next);
   }
 
-  /// `use_joint_0`, ...: a SCARA has four. No robot has fewer than three, so parameters that name
-  /// fewer do not say it.
+  /// The number of axes by `use_joint_0`, ...: a SCARA has four. No robot has fewer than three, so
+  /// with fewer the number is unknown.
   static int axes_of(const ParameterInstance& robot) {
     constexpr int kFewest = 3;
     int named = 0;
@@ -137,8 +137,7 @@ class Backup {
     }
   }
 
-  /// The number of an attribute; `otherwise` where it is left at what the controller takes by
-  /// default.
+  /// The number in an attribute; `otherwise` is the controller's default for a missing one.
   Status number(const ParameterInstance& of, const std::string& attribute, double otherwise,
                 double& value) const {
     value = otherwise;

@@ -14,7 +14,7 @@ namespace trammel::cam {
 
 namespace {
 
-/// As a cell file may have it: `Tool 1` becomes `Tool_1`.
+/// A name that a cell file allows: `Tool 1` becomes `Tool_1`.
 std::string plain_name(const std::string& name) {
   std::string plain;
   for (const char c : name) {

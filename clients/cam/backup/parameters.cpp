@@ -7,7 +7,7 @@ namespace trammel::cam {
 
 namespace {
 
-/// Lines, with those that end in a backslash joined to the next.
+/// Lines; one that ends in a backslash is joined to the next.
 struct Line {
   std::string text;
   int number = 0;

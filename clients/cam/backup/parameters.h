@@ -21,8 +21,7 @@ struct ParameterInstance {
   }
 };
 
-/// The instances of a configuration file, in order. What is no instance is passed over: a file
-/// never fails.
+/// The instances of a configuration file, in order. Other lines are skipped, so a file never fails.
 [[nodiscard]] std::vector<ParameterInstance> parameter_instances(std::string_view text);
 
 }  // namespace trammel::cam

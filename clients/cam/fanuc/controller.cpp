@@ -69,7 +69,7 @@ Told Controller::setting(const std::string& name) {
   if (numbers.size() == 6) return {pose_of(Coordinates::kAnglesXyz, numbers), "", true, set->where};
   const std::string why = fmt::format(
       "{} comes from {}, whose value is not constant in the program", name, shown(set->from));
-  // A row of --frames may say what no file says of a register.
+  // A row of --frames may give the value of a register that no file has.
   const bool open = from == nullptr && set->from.starts_with("PR[") && !set->from.ends_with("[*]");
   return {{}, why, !open, ""};
 }

@@ -42,18 +42,18 @@ struct Controller {
   std::map<std::string, Register> registers;
   std::map<std::string, Setting> settings;  ///< of UFRAME[n] and UTOOL[n]
   struct Statements {
-    std::string first;  ///< where
+    std::string first;  ///< the place of the first one
     int count = 0;
   };
   std::map<std::string, Statements> loads;  ///< of PAYLOAD[n]
   ListedValues system;                      ///< UFRAME[n] and UTOOL[n] of the system variables
-  std::set<std::string> programs;           ///< that are read, by name
+  std::set<std::string> programs;           ///< the names of the programs that are read
 
-  /// `PR[5,1]=100`, `PR[5]=LPOS`, of the file of that number.
+  /// Records `PR[5,1]=100` or `PR[5]=LPOS` in the file of that number.
   void note_register(const Assignment& set, const std::string& where, std::size_t file);
   /// A frame or tool by its number.
   [[nodiscard]] ProgramFrame frame_of(const std::string& number_text, const ReadOptions& options);
-  /// `file`: of the program that has it.
+  /// `file`: the file of its program.
   [[nodiscard]] ProgramTool tool_of(const std::string& number_text, const ReadOptions& options,
                                     const std::string& file);
 

@@ -34,9 +34,10 @@ using fanuc::Statement;
 /// The selection of UFRAME_NUM and UTOOL_NUM: a number; empty: not set; else why it is not known.
 struct Selected {
   std::string frame, tool;
-  std::string beside;  ///< a program that may select another one at any time, as the statement that
-                       ///< starts it; or empty
-  std::string follows;  ///< what moves the targets at run time, `Track TAST[1]`; or empty
+  std::string beside;   ///< the statement that starts a concurrent program which may select another
+                        ///< one at any time; or empty
+  std::string follows;  ///< the instruction that moves the targets at run time, `Track TAST[1]`; or
+                        ///< empty
   bool operator==(const Selected&) const = default;
 };
 
@@ -54,7 +55,7 @@ class File {
         options_(options),
         text_(program.files[index].text) {}
 
-  /// Its positions, and what it sets.
+  /// Reads its positions and its settings.
   void read() {
     name_ = fanuc::name_of_program(program_.files[index_]);
     controller_.programs.insert(name_);
@@ -196,7 +197,7 @@ class File {
     std::string& number = frame ? selected.frame : selected.tool;
     number = !set.perhaps || number == now ? now : kDecided;
   }
-  /// The selection where a program beside may select another one.
+  /// The selection, if a concurrent program may select another one.
   static std::string with(const std::string& selected, const std::string& beside) {
     return beside.empty() || !is_number(selected) ? selected : beside + " may select another one";
   }
@@ -259,7 +260,7 @@ class File {
     }
   }
 
-  /// `UF : F` is the frame that is selected. Where another one is selected than the point has, the
+  /// `UF : F` is the selected frame. If a point has another number than the selected one, the
   /// controller stops.
   std::size_t frame_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UF", "UFRAME_NUM", number_text, selected);
@@ -279,8 +280,8 @@ class File {
     tool.why_not = why;
     return add_once(program_, std::move(tool));
   }
-  /// The reason against a point with its own number, beside what is selected where a motion goes to
-  /// it; empty: they agree.
+  /// The conflict between a point's own number and the selected one when a motion goes to the
+  /// point; empty: they agree.
   static std::string why_not_there(const char* own, const char* word,
                                    const std::string& number_text, const std::string& selected) {
     if (number_text.empty()) return fmt::format("the point does not say its {}", own);
@@ -322,7 +323,7 @@ class File {
     }
   }
 
-  /// `L P[2] 250mm/sec FINE`: it stops there. Its point comes again under a new number.
+  /// `L P[2] 250mm/sec FINE`: the motion stops there. The repeated point gets a new number.
   void repeat(const Motion& motion, const Tokens& tokens) {
     if (motion.points.size() != 1 || (motion.kind != "J" && motion.kind != "L")) return;
     const auto known = by_name_.find(motion.points[0]);
@@ -330,7 +331,7 @@ class File {
     const std::size_t fine = tokens.find("FINE", point);
     if (known == by_name_.end() || behind >= tokens.size() || fine >= tokens.size()) return;
     for (std::size_t k = fine + 1; k < tokens.size(); ++k) {
-      // `SPOT[1]` or `TB .1sec, CALL ...` does work at the place; these do not.
+      // `SPOT[1]` or `TB .1sec, CALL ...` do work at the place. The listed options do not.
       const std::string_view word = tokens[k].text;
       if (!word.starts_with("ACC") && word != "PTH" && word != "Wjnt" && !tokens[k].is_number())
         return;
@@ -387,7 +388,8 @@ class File {
   std::set<std::size_t> used_;
 };
 
-/// The motions of all programs, each with what is selected before it: a program calls another.
+/// Reads the motions of all programs, each with the selection before it, since a program calls
+/// others.
 void read_motions(std::vector<File>& files) {
   struct Place {
     std::size_t file = 0, statement = 0;
@@ -401,7 +403,7 @@ void read_motions(std::vector<File>& files) {
   };
   for (std::size_t f = 0; f < files.size(); ++f) {
     add({Step::Kind::kRoutine, files[f].name()}, {});
-    int open = 0;  // an ENDIF without its IF ends no program
+    int open = 0;  // an ENDIF without its IF does not end a program
     for (std::size_t s = 0; s < files[f].statements(); ++s) {
       bool first = true;
       for (Step& step : files[f].steps_of(s)) {

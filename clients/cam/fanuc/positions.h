@@ -33,7 +33,7 @@ struct Position {
 [[nodiscard]] std::size_t point_number(const std::string& name);
 /// `P[3:"hole"]{ GP1: UF : 1, UT : 2, CONFIG : 'N U T, 0, 0, 0', X = 1.000 mm, ... };`
 [[nodiscard]] std::vector<Position> positions_of(const std::string& text, const Part& part);
-/// A position once more under a new number, a line each, above the line of `at`.
+/// Repeats a position under a new number, line by line, above the line of `at`.
 [[nodiscard]] std::vector<NewLine> another_position(const std::string& text,
                                                     const Position& position, std::size_t at);
 /// Groups beyond the first, and E1 to E3 of the first.

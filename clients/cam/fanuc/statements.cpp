@@ -22,7 +22,7 @@ constexpr std::string_view kKnown =
     "LINEAR_MAX_SPEED FORCE SENSOR DIAG POINT_LOGIC LINECOUNT TOOL_OFFSET_CONDITION CLEAR "
     "TC_ONLINE RESET PULSE RETURN ";
 
-/// Without comments of points and registers, `P[1:don't]`, and without texts: words in them mean
+/// Removes comments of points and registers, `P[1:don't]`, and texts, since words in them mean
 /// nothing.
 Tokens without_comments(const std::string& text, const Tokens& tokens) {
   Tokens kept(text);
@@ -42,7 +42,8 @@ Tokens without_comments(const std::string& text, const Tokens& tokens) {
   return kept;
 }
 
-/// `IF (R[1]=1),PR[5,1]=(200)`: where what it may do begins; 0: the statement is no such one.
+/// The start of the conditional action in `IF (R[1]=1),PR[5,1]=(200)`; 0: the statement has another
+/// form.
 std::size_t done_perhaps(const Tokens& tokens) {
   int depth = 0;
   for (std::size_t at = 0; at + 1 < tokens.size() && tokens[0].is("IF"); ++at) {
@@ -117,7 +118,7 @@ std::optional<double> speed_in(const Tokens& tokens) {
   return speed;
 }
 
-/// The effect of a word behind a motion on where it goes; empty: none.
+/// The way in which a word behind a motion changes its end; empty: it does not.
 std::string moved_by(const Token& word) {
   static const std::set<std::string_view> kDisplace = {"Offset",      "OFFSET",  "Tool_Offset",
                                                        "TOOL_OFFSET", "VOFFSET", "INC"},
@@ -172,7 +173,7 @@ std::vector<Statement> statements_of(const std::string& text, const Part& part) 
     if (end < part.end && (last == std::string::npos || last < begin || text[last] != ';'))
       continue;
     const std::size_t first = text.find_first_not_of(" \t\r\n0123456789:", begin);
-    // Remarks: `!hole`, `--eg:hole`, and what is commented out, `//L P[1] ...`.
+    // Remarks: `!hole`, `--eg:hole`, and statements commented out, `//L P[1] ...`.
     if (first < end && std::string_view("!-/").find(text[first]) == std::string_view::npos)
       add_statements(without_comments(text, tokens_of(text, begin, end, first_line, {})),
                      statements);

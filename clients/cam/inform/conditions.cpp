@@ -77,7 +77,7 @@ class File {
 
   const SourceFile& file_;
   ListedValues& all_;
-  std::string name_;  ///< of what is read; empty: nothing that is wanted
+  std::string name_;  ///< the name of the current entry; empty: it is not needed
   bool is_tool_ = false;
   int line_ = 0;                           ///< of its pose
   std::vector<std::vector<double>> told_;  ///< its lines of numbers

@@ -20,11 +20,11 @@ using inform::Motion;
 using inform::Position;
 using inform::Statement;
 
-/// The instructions that move the robot beside where motions say.
+/// The instructions that move the robot away from its programmed motions.
 struct Displaced {
-  std::string shifted;  ///< where a SFTON stands that holds; empty: none does
-  std::string sensed;   ///< what a sensor or a soft axis does, as `COMARCON (drill.jbi line 7)`;
-                        ///< empty: nothing
+  std::string shifted;  ///< the place of an active SFTON; empty: none is active
+  std::string sensed;   ///< an active sensor or soft axis, as `COMARCON (drill.jbi line 7)`; empty:
+                        ///< none
   bool operator==(const Displaced&) const = default;
 };
 
@@ -46,8 +46,8 @@ class Job {
   [[nodiscard]] const std::string& name() const { return text_.name; }
   [[nodiscard]] const std::vector<Statement>& statements() const { return text_.statements; }
 
-  /// Frames and tools that jobs set, with where. A relative job goes by another user frame than the
-  /// one in its head where its call gives it one.
+  /// Records the frames and tools that jobs set, with their places. A relative job uses another
+  /// user frame than the one in its head if its call gives one.
   void note_settings(std::map<std::string, std::string>& set) const {
     for (const Statement& statement : text_.statements) {
       const std::string where =
@@ -106,8 +106,8 @@ class Job {
   }
 
  private:
-  /// Where the axes stand that carry the robot or the part, as the motions to a position say. They
-  /// are in pulses: it can only be told whether they move.
+  /// Compares the axes that carry the robot or the part between the motions to a position. They are
+  /// in pulses, so it only finds whether they move.
   std::string take_external(const Site& site, ProgramTarget& target) const {
     std::optional<std::map<int, double>> all;
     for (const SiteUse& use : site.uses) {
@@ -151,7 +151,7 @@ class Job {
     list.counted = std::stoul(text.substr(begin, end - begin));
   }
 
-  /// `MOVL C00001 V=100.0`, with a position behind the last one, which has the same tool, frame and
+  /// `MOVL C00001 V=100.0`, with a position behind the last one, and with the same tool, frame and
   /// configuration.
   void repeat(const Statement& statement, const Motion& motion, const Position& position) {
     const std::string& text = program_.files[index_].text;
@@ -159,7 +159,7 @@ class Job {
     const bool stops = !statement.tokens.has("PL") || text_of_pl(statement) == "0";
     static const std::set<std::string_view> kOfTheWay = {"V", "VJ", "PL", "ACC", "DEC", "="};
     for (std::size_t k = 2; k < statement.tokens.size(); ++k) {
-      // `NWAIT` or `UNTIL IN#(1)=ON` does more than to go there.
+      // `NWAIT` or `UNTIL IN#(1)=ON` do more than move the robot.
       if (!statement.tokens[k].is_number() && !kOfTheWay.contains(statement.tokens[k].text)) return;
     }
     if (!plain || !stops || last_ == nullptr || position.numbers.size() < 6 ||
@@ -248,7 +248,7 @@ class Job {
                        fmt::format("{} line {}", condition.file, condition.line));
   }
 
-  /// Why a frame or tool is not what it was; empty: no job sets it.
+  /// The reason why a frame or tool has changed; empty: no job sets it.
   [[nodiscard]] std::string why_set(const std::string& name, const std::string& any) const {
     for (const std::string& one : {name, any}) {
       if (const auto set = set_->find(one); set != set_->end()) return set->second;
@@ -283,7 +283,7 @@ class Job {
   }
 
  private:
-  /// Why its position cannot be corrected; empty: it can.
+  /// The reason why its position cannot be corrected; empty if it can.
   [[nodiscard]] std::string why_left(const Motion& motion, const Displaced& displaced) const {
     if (!motion.ended_by.empty())
       return fmt::format("a sensor may end the motion ({})", motion.ended_by);

@@ -14,8 +14,8 @@ namespace trammel::cam {
 
 namespace inform {
 
-/// The values of Yaskawa's TOOL.CND and UFRAME.CND, by the names `TOOL[0]`, `USER[1]`: a tool
-/// from the flange, a user frame from the robot's base. One without its six numbers is not there.
+/// The values of Yaskawa's TOOL.CND and UFRAME.CND, by the names `TOOL[0]`, `USER[1]`: a tool from
+/// the flange, a user frame from the robot's base. An entry without its six numbers is left out.
 [[nodiscard]] ListedValues conditions(const std::vector<SourceFile>& files);
 
 }  // namespace inform

@@ -28,8 +28,8 @@ std::string value_behind(std::string_view line) {
   return std::string(line.substr(at + 1, end - at));
 }
 
-/// `C00000`, and the external axes of the same place: `BC00000` that carry the robot, `EC00000`
-/// that carry the part.
+/// `C00000`, and the external axes for the same position: `BC00000` for those that carry the robot,
+/// `EC00000` for those that carry the part.
 bool names_position(std::string_view text) {
   const std::size_t letter = !text.empty() && (text[0] == 'B' || text[0] == 'E') ? 1 : 0;
   return text.size() > letter + 1 && text[letter] == 'C' && is_digit(text[letter + 1]);

@@ -49,7 +49,7 @@ class HandedOver {
       if (!by_value && tokens[t + 1].is_word()) names_.note_handed_over(f, k, t + 1, name);
     }
   }
-  /// True if the parameter of that number is `:IN`.
+  /// True if the parameter with that number is `:IN`.
   [[nodiscard]] bool takes_value(const Routine& routine, std::size_t number) const {
     if (routine.first == 0) return true;
     const Tokens& tokens = lines_[routine.file][routine.first - 1].tokens;

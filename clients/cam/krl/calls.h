@@ -10,7 +10,7 @@
 #include "clients/cam/krl/lines.h"
 #include "clients/cam/krl/variables.h"
 
-/// Routines of KRL files, and what is handed over to them.
+/// Routines of KRL files, and the variables that are passed to them.
 namespace trammel::cam::krl {
 
 struct Routine {
@@ -35,8 +35,9 @@ class Routines {
   std::map<std::string, std::size_t, std::less<>> by_name_;
 };
 
-/// `shift(XP2)`: a routine of these files that takes it without `:IN`, or one of others, may set
-/// it. Returns the routines that are called and not in the files.
+/// Records variables that a call may set. In `shift(XP2)` this is so if the routine is in these
+/// files and takes the parameter without `:IN`, or if it is not in these files. Returns the called
+/// routines that are missing.
 [[nodiscard]] std::set<std::string> note_handed_over(const std::vector<std::vector<Line>>& lines,
                                                      const Routines& routines, Variables& names);
 

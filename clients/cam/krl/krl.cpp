@@ -72,7 +72,7 @@ class Reader {
     const std::vector<Line>& lines = lines_[f];
     if (is_controllers_bas(f)) return program_.mark_places.push_back(mark);
     constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-    std::size_t spline = kNone;  // the head of the block that the line is in
+    std::size_t spline = kNone;  // the head of the block around the line
     bool any = false, open = false;
     for (std::size_t k = 0; k < lines.size(); ++k) {
       tools_.note_tool_name(lines[k]);
@@ -99,7 +99,7 @@ class Reader {
     program_.mark_places.push_back(mark);
   }
 
-  /// `PTP {E1 90}`, `ASYPTP {E1 90}`: an external axis moves, and no target says it.
+  /// `PTP {E1 90}`, `ASYPTP {E1 90}`: an external axis moves, but no target mentions the motion.
   void note_moved_axes(const Tokens& tokens) {
     const std::string_view word = tokens[0].text;
     const bool relative = krl::is_relative(word);
@@ -115,7 +115,7 @@ class Reader {
     }
   }
 
-  /// The controller's own `bas.src`: BAS( ) means the same with it among the files as without.
+  /// The controller's own `bas.src`: BAS( ) has the same meaning with and without it.
   [[nodiscard]] bool is_controllers_bas(std::size_t f) const {
     const std::string& name = program_.files[f].name;
     if (upper(name.substr(name.find_last_of("/\\") + 1)) != "BAS.SRC") return false;
@@ -125,7 +125,7 @@ class Reader {
     });
   }
 
-  /// Routines that the files lack may do more than they seem to.
+  /// A routine that is not in the files may do more than its name suggests.
   void note_elsewhere() {
     static const std::set<std::string> kOfTheController = {
         "PULSE",  "COPEN", "CCLOSE", "CREAD", "CWRITE",
@@ -141,7 +141,7 @@ class Reader {
         all.size() > kMost ? fmt::format(" and {} more", all.size() - kMost) : ""));
   }
 
-  // Second pass: what happens, in the order of the text.
+  // Second pass: the effects of the lines, in the order of the text.
 
   void note_calls(const Routine& routine, std::set<std::string>& called) const {
     for (std::size_t k = routine.first; k < routine.last; ++k) {
@@ -171,7 +171,7 @@ class Reader {
     return std::uint64_t{1} << std::min<std::size_t>(interrupt, 63);
   }
 
-  /// Makes of a state before a line what declared interrupts make of it.
+  /// Adds the effects of declared interrupts to the state before a line.
   void come_in(State& state, int depth) {
     if (inside_interrupt_ || state.armed == 0) return;
     for (bool more = true; more;) {
@@ -199,7 +199,7 @@ class Reader {
       for (std::size_t k = routine.first; k < routine.last; ++k)
         steps.push_back(krl::step_of(lines_[routine.file][k].tokens));
       order->second = flow_of(steps);
-      // RESUME ends what was interrupted, wherever it was.
+      // RESUME ends the interrupted routine, wherever it was.
       for (std::vector<std::size_t>& next : order->second.next) {
         if (resumes_) next.push_back(steps.size());
       }
@@ -222,7 +222,7 @@ class Reader {
     return ends_[key] = states_in(r, begin, depth).back();
   }
 
-  /// Its motions, and those of what it calls.
+  /// Follows its motions, and those of its calls.
   void run(std::size_t r, const State& begin, int depth) {
     if (!run_.emplace(r, begin, inside_interrupt_).second) return;
     ran_.insert(r);
@@ -249,7 +249,7 @@ class Reader {
     }
   }
 
-  /// Applies what a line sets, and what it calls.
+  /// Applies the settings and the calls of a line.
   void set(std::size_t f, std::size_t k, State& state, int depth) {
     const Tokens& tokens = lines_[f][k].tokens;
     settings_.set(f, k, state);
@@ -264,7 +264,7 @@ class Reader {
 
   ReadOptions options_;
   Program program_;
-  std::deque<std::string> capitals_;  ///< the files, of which the lines are
+  std::deque<std::string> capitals_;  ///< the files, to whose texts the lines refer
   std::vector<std::vector<Line>> lines_;
   krl::Routines routines_;
   krl::Variables names_{program_.files, lines_};
@@ -276,7 +276,7 @@ class Reader {
   std::map<std::size_t, Flow> orders_;  ///< of the lines of each routine
   std::map<std::tuple<std::size_t, State, bool>, State> ends_;
   std::vector<std::size_t> interrupts_;  ///< routines that come in between
-  bool resumes_ = false;                 ///< an interrupt may end what it came in
+  bool resumes_ = false;                 ///< an interrupt may end the routine that it interrupted
   bool inside_interrupt_ = false;
   std::set<std::tuple<std::size_t, State, bool>> run_;
   std::set<std::size_t> ran_;

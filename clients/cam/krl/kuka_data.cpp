@@ -67,7 +67,7 @@ class KukaDataReader {
     return named == names.end() ? otherwise : named->second;
   }
 
-  /// A tool or base without a name that is at its zero was never set.
+  /// A tool or base without a name and with a zero frame was never set.
   void read_tool(int number) {
     const std::string data = fmt::format("TOOL_DATA[{}]", number);
     if (!names_.is_set(data, 0)) return;

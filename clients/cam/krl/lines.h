@@ -22,7 +22,7 @@ struct Line {
 /// `capitals`: the text in capitals. Both outlive the lines.
 [[nodiscard]] std::vector<Line> lines_of(std::string_view text, std::string_view capitals);
 
-/// The text that stands for a value: `{X 1,Y 2}`, `XP1[3]`, a number, or something else.
+/// The text of a value: `{X 1,Y 2}`, `XP1[3]`, a number, or something else.
 struct Value {
   enum class Kind { kNumber, kBits, kAggregate, kName, kOther };
   Kind kind = Kind::kOther;

@@ -34,7 +34,7 @@ class Machine {
   Machine(const std::vector<std::vector<Line>>& lines, const Variables& names)
       : lines_(lines), names_(names) {}
 
-  /// Why it is no arm of the kind that machine_arm() takes; empty: it is.
+  /// The reason why machine_arm() does not take this kind of arm; empty if it does.
   [[nodiscard]] std::string against_kind() const {
     for (const auto& [name, wanted, what] :
          {std::tuple("$MAIN_AXIS", "NR", "an arm of six turning axes"),
@@ -111,8 +111,8 @@ class Machine {
   const Variables& names_;
 };
 
-/// The rows of axes 3 and 4, whose angles are still open, from `$TX3P3`. The axis of row 3 is y of
-/// the frame that `$TX3P3` is told in.
+/// The rows of axes 3 and 4, whose angles are still open, from `$TX3P3`. The axis of row 3 is the y
+/// axis of the frame of `$TX3P3`.
 std::string add_forearm(const Pose& X3P3, Joint& third, Joint& fourth) {
   const Matrix3 R = about(0, kQuarter) * X3P3.linear();
   const Vector3 p = about(0, kQuarter) * X3P3.translation(), axis_4 = R.col(2);
@@ -190,7 +190,7 @@ class Arm {
     return "";
   }
 
-  /// From the motors' rated speeds and their gears, where both are told.
+  /// From the motors' rated speeds and their gears, if the file states both.
   void read_speeds() {
     for (int axis = 1; axis <= kTurning; ++axis) {
       const std::string gear = fmt::format("$RAT_MOT_AX[{}]", axis);

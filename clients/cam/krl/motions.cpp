@@ -167,7 +167,7 @@ void Motions::find_order(bool resumes) {
       for (const std::size_t called : routines_.called_by(line.tokens))
         steps.push_back({Step::Kind::kCall, std::to_string(called)});
       const auto move = moves_.find({routine.file, k});
-      // A line that is left leaves the posture as it was.
+      // A motion that is left alone leaves the posture as it was.
       if (move != moves_.end() &&
           (is_by_axes(line.word()) || !program_.moves[move->second].targets.empty()))
         moves.emplace(steps.size(), Place(routine.file, k));
@@ -187,8 +187,8 @@ void Motions::find_order(bool resumes) {
   for (const auto& [move, axes] : axes_) program_.moves[move].axes = axes;
 }
 
-/// Where the program begins, or an interrupt ends what it came in, what a target does not say is
-/// taken to be nearest to zero.
+/// At the start of the program, and where an interrupt ends the interrupted routine, unspecified
+/// values of a target are taken nearest to zero.
 void Motions::follow(const Place& place, const std::set<std::size_t>& before) {
   ProgramMove& move = program_.moves[moves_.at(place)];
   const bool by_axes = is_by_axes(lines_[place.first][place.second].word());
@@ -200,8 +200,8 @@ void Motions::follow(const Place& place, const std::set<std::size_t>& before) {
   move.before = before;
 }
 
-/// `CIRC XP1,XP2,CA 360`: the circle through the points is corrected, and the arc ends elsewhere on
-/// it.
+/// For `CIRC XP1,XP2,CA 360` the circle through the points is corrected, so the arc ends elsewhere
+/// on it.
 void Motions::note_angles() {
   if (by_angle_.empty()) return;
   const auto& [f, line] = *by_angle_.begin();

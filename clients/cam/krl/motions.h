@@ -12,7 +12,7 @@
 #include "clients/cam/krl/statements.h"
 #include "clients/cam/krl/targets.h"
 
-/// Where the motions of a KRL program go, with what is set when they come.
+/// The targets of the motions of a KRL program, with the settings at each motion.
 namespace trammel::cam::krl {
 
 class Motions {
@@ -30,10 +30,10 @@ class Motions {
 
   /// The head of the spline block that a line is in.
   void note_spline(std::size_t f, std::size_t k, std::size_t head) { splines_[{f, k}] = head; }
-  /// A line is reached with this set. It may be no motion.
+  /// Records that a line, which need not be a motion, is reached with these settings.
   void reach(std::size_t f, std::size_t k, State state);
-  /// Behind all: targets, and which motions may be the last before each. `resumes`: an interrupt
-  /// may end what it came in.
+  /// Call it last: it makes the targets, and the possible last motions before each. `resumes`: an
+  /// interrupt may end the routine that it interrupted.
   void finish(bool resumes);
   /// A sentence on arcs that end by their angle.
   void note_angles();

@@ -65,7 +65,7 @@ void Settings::apply_part(const Setting& setting, const std::string& place, Stat
   state.frame = tools_.unknown_base("$BASE" + by_itself);
 }
 
-/// Where ways come together, what they set differently is not known.
+/// Where paths meet, settings that differ between them become unknown.
 void Settings::join(State& state, const State& other, const std::string& by) {
   const std::string why =
       by.empty() ? "a branch or a loop of the program decides it" : by + " may change it";
@@ -82,8 +82,8 @@ void Settings::join(State& state, const State& other, const std::string& by) {
   state.speed = std::max(state.speed, other.speed);
 }
 
-/// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a
-/// spline, alone.
+/// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: only for this motion, or for those of a
+/// spline.
 void Settings::apply_with(std::size_t f, std::size_t k, State& state) {
   for (const Setting& setting : settings_with(lines_[f][k].tokens))
     apply_one_with(setting, f, k, state);

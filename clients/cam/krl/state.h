@@ -33,10 +33,10 @@ class Settings {
 
   /// The settings that a line makes by itself.
   void set(std::size_t f, std::size_t k, State& state);
-  /// Where ways come together, what they set differently is not known.
+  /// Where paths meet, settings that differ between them become unknown.
   void join(State& state, const State& other, const std::string& by);
-  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a
-  /// spline, alone.
+  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: only for this motion, or for those of
+  /// a spline.
   void apply_with(std::size_t f, std::size_t k, State& state);
   /// True if lines set tool or base for more than one motion.
   [[nodiscard]] bool by_hand() const { return sets_by_hand_; }

@@ -102,7 +102,8 @@ class Stated {
   const ReadOptions& options_;
   Variables& names_;
   Program& program_;
-  std::string on_rail_;  ///< where an external axis is said to carry the robot; empty: nowhere
+  std::string on_rail_;  ///< the place of a statement that an external axis carries the robot;
+                         ///< empty: none
 };
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 namespace trammel::cam::krl {
 
-/// Gives the program what `$machine.dat` says of the robot: where it stands, its lengths, axes
-/// and type. Tells the names what `$ROBROOT` stands for.
+/// Gives the program the robot from `$machine.dat`: its place, lengths, axes and type. Defines the
+/// value of `$ROBROOT` for names.
 void read_stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options,
                  Variables& names, Program& program);
 

@@ -34,24 +34,24 @@ struct Motion {
   bool is_arc = false;
   bool ends_by_angle = false;
 };
-/// Empty: the line is none, or `PTP $AXIS_ACT`, which goes to where the axes are.
+/// Empty: the line is not a motion, or it is `PTP $AXIS_ACT`, which goes to the present place.
 [[nodiscard]] std::optional<Motion> motion_of(const Tokens& tokens);
 
 /// `BAS(#TOOL,1)`
 struct Bas {
   std::string_view sets;  ///< `TOOL`
   Token to;
-  std::optional<double> speed_mm_s;  ///< where `to` is one in m/s
+  std::optional<double> speed_mm_s;  ///< if `to` is a speed in m/s
 };
 [[nodiscard]] std::optional<Bas> bas_of(const Tokens& tokens);
 
 /// `$TOOL=TOOL_DATA[1]`, `$BASE = SBASE(FP1.BASE_NO)`, `$VEL.CP=0.2`: of a line, or behind `WITH`.
 struct Setting {
   std::string_view name;             ///< `$TOOL`
-  bool whole = false;                ///< no part of it alone
+  bool whole = false;                ///< the whole variable, not only a part
   std::string_view function;         ///< `SBASE`; empty: none
   Token argument;                    ///< its first
-  std::vector<Value> operands;       ///< what it is set to
+  std::vector<Value> operands;       ///< the value assigned
   std::string_view constant;         ///< `#TCP` -> `TCP`, also as an argument; empty: none
   std::optional<double> speed_mm_s;  ///< of `$VEL`
 };
@@ -59,12 +59,12 @@ struct Setting {
 [[nodiscard]] std::optional<Setting> setting_of(const Tokens& tokens);
 [[nodiscard]] std::vector<Setting> settings_with(const Tokens& tokens);
 
-/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`:
-/// where what is done stands; 0: the line is neither.
+/// The start of the delayed action in `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )` or `TRIGGER WHEN
+/// DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`; 0: the line is neither.
 [[nodiscard]] std::size_t done_later(const Tokens& tokens);
 /// Words that stand before `(`, in their order.
 [[nodiscard]] std::vector<std::string_view> called_in(const Tokens& tokens);
-/// The effect of a line on the order. Calls are not in it.
+/// The effect of a line on the order, without its calls.
 [[nodiscard]] Step step_of(const Tokens& tokens);
 
 }  // namespace trammel::cam::krl

@@ -116,7 +116,7 @@ void Targets::note_rest(const Value& value, ProgramTarget& target) {
   }
 }
 
-/// Notes what else reads the targets that are written anew.
+/// Records other statements that read the rewritten targets.
 void Targets::note_readings(std::size_t f) {
   if (targets_.empty()) {
     for (const auto& [key, variable] : names_.all()) {
@@ -145,7 +145,7 @@ void Targets::note_reading(std::size_t f, std::size_t k, std::size_t at) {
   const bool number = root != one[0].name;
   const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
   const bool plain = one.size() == 1 && !tokens[at - 1].is(":");
-  if (moves && !number && plain) return;  // the motion goes to it
+  if (moves && !number && plain) return;  // it is the target of the motion
   const auto own = names_.all().find({stem_of(program_.files[f].name), root});
   if (own != names_.all().end()) {
     if (own->second.values.size() == 1) add_reading(f, k, at, number, own->second.values[0]);

@@ -12,7 +12,7 @@
 /// The targets where the motions of a KRL program go.
 namespace trammel::cam::krl {
 
-constexpr int kDecimals = 3;  ///< of a number that the program did not write
+constexpr int kDecimals = 3;  ///< for numbers that the program did not write
 
 class Targets {
  public:
@@ -20,16 +20,16 @@ class Targets {
           const ReadOptions& options, Program& program)
       : lines_(lines), names_(names), options_(options), program_(program) {}
 
-  /// A motion goes to what stands there.
+  /// Adds the place to which a motion goes.
   void add(const Assigned& at) { places_[{at.file, at.operands[0].begin}] = at; }
-  /// Notes what else reads the targets that are written anew.
+  /// Records other statements that read the rewritten targets.
   void note_readings(std::size_t f);
   [[nodiscard]] std::string describe(const Site& site, ProgramTarget& target) const;
   /// Positions of data lists that nothing moves to.
   void list_unused();
-  /// The operand that has the status, turns and external axes; none where it is not known.
+  /// The operand with the status, turns and external axes; empty if it is not known.
   [[nodiscard]] const Value* last_of(const std::vector<Value>& operands, std::size_t file) const;
-  /// These as the text behind six numbers: `,S 2,T 10`.
+  /// Status, turns and axes as text behind six numbers: `,S 2,T 10`.
   [[nodiscard]] static std::string rest_of(const Value* value);
 
  private:

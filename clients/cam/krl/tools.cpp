@@ -157,7 +157,7 @@ std::size_t Tools::tool_carrying(std::size_t tool, std::size_t index) {
   return add_tool(std::move(carrying));
 }
 
-/// Why a row of --frames cannot hold beside the value of the files; empty: it can.
+/// The reason why a row of --frames contradicts the value in the files; empty if they agree.
 std::string Tools::against_row(const std::string& row, const Pose& X, const Told<Pose>& by_files,
                                const Assigned& at) const {
   return by_files ? cam::against_row(row, X, *by_files, names_.place(at.file, at.line))
@@ -193,7 +193,7 @@ std::optional<StatedLoad> Tools::load_of(const std::vector<Value>& operands) {
   return load;
 }
 
-/// `{M -1}` says that nobody has told the load.
+/// `{M -1}` means that the load was never entered.
 std::string Tools::note_on_default(const std::optional<StatedLoad>& load,
                                    const Assigned& at) const {
   if (!load || load->mass >= 0) return "";
@@ -203,8 +203,8 @@ std::string Tools::note_on_default(const std::optional<StatedLoad>& load,
       load->mass, names_.place(at.file, at.line));
 }
 
-/// Why a base moves: `MACH_DEF_INDEX[2]=3` hangs it on a unit of the controller; empty: it does
-/// not.
+/// The reason why a base moves: `MACH_DEF_INDEX[2]=3` attaches it to a unit of the controller.
+/// Empty if the base does not move.
 std::string Tools::carried(int number, std::size_t f) const {
   const Variable* unit = names_.find(fmt::format("MACH_DEF_INDEX[{}]", number), f);
   if (unit == nullptr || unit->values.empty() || unit->values[0].operands.size() != 1) return "";
@@ -216,7 +216,7 @@ std::string Tools::carried(int number, std::size_t f) const {
                      names_.place(at.file, at.line));
 }
 
-/// `MACHINE_DEF[3]={NAME[] "",...,MECH_TYPE #NONE}`: there is no such unit.
+/// True for `MACHINE_DEF[3]={NAME[] "",...,MECH_TYPE #NONE}`: the unit does not exist.
 bool Tools::carries_nothing(const Assigned& index, std::size_t f) const {
   const Told<const Assigned*> unit =
       names_.value_of(fmt::format("MACHINE_DEF[{:g}]", index.operands[0].number), f);

@@ -16,7 +16,7 @@
 /// The values of the names of a KRL program.
 namespace trammel::cam::krl {
 
-/// A value, or one clause that says why the program decides it at run time.
+/// A value, or one clause with the reason why the program decides it at run time.
 template <typename T>
 using Told = tl::expected<T, std::string>;
 [[nodiscard]] inline tl::unexpected<std::string> because(std::string why) {
@@ -47,12 +47,13 @@ class Variables {
 
   /// A declaration or assignment: behind `DECL` and a type, or bare.
   void note_value(std::size_t f, std::size_t k);
-  /// `(p:IN,q:OUT)`, from a token on: what a routine calls so is nothing of a data list.
+  /// Records `(p:IN,q:OUT)`, from a token on: within the routine these names hide those of data
+  /// lists.
   void note_parameters(std::size_t f, std::size_t k, std::size_t at);
   /// A name that stands alone between brackets or commas of a call, which may set it.
   void note_handed_over(std::size_t f, std::size_t k, std::size_t at, const std::string& to);
-  /// Joins variables that a file sets and does not declare: they are another one's, or the
-  /// controller's.
+  /// Joins the variables that a file sets and does not declare. They belong to another file or to
+  /// the controller.
   void join_globals();
   [[nodiscard]] std::string place(std::size_t f, std::size_t k) const;
   /// A name as a line spells it.
@@ -78,7 +79,7 @@ class Variables {
  private:
   void note_value(std::size_t f, std::size_t k, std::size_t at);
   void merge(const Variable& from, const std::string& root, Variable& into) const;
-  /// Where any element of its array is changed; null: nowhere.
+  /// The change of any element of its array; null: there is none.
   [[nodiscard]] const Variable* any_changed(const std::string& name, std::size_t f) const;
   [[nodiscard]] std::string set_at(const std::string& name, std::size_t f, std::size_t k) const;
   [[nodiscard]] Told<Pose> frame_of(const Value& value, std::size_t f, int depth) const;
@@ -86,7 +87,7 @@ class Variables {
   const std::vector<SourceFile>& files_;
   const std::vector<std::vector<Line>>& lines_;
   std::map<std::pair<std::string, std::string>, Variable> variables_;
-  std::map<std::string, std::set<std::string>> declared_;  ///< in which files each word is
+  std::map<std::string, std::set<std::string>> declared_;  ///< the files that declare each word
   Pose X_WB_ = Pose::Identity();
 };
 

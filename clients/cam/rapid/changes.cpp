@@ -14,7 +14,7 @@ namespace {
 
 using Kind = Expression::Kind;
 
-/// Instructions that leave the data which they are given as they are.
+/// Instructions that do not change their arguments.
 bool only_reads(const std::string& name) {
   static const std::set<std::string> kMotions = {"move", "trig", "arc",  "spot",
                                                  "disp", "pain", "capl", "capc"};
@@ -89,7 +89,7 @@ void Interpreter::note_changes() {
       }
     }
   }
-  // A change of a parameter changes what is handed over, through any number of calls.
+  // A change of a parameter changes the caller's argument, through any number of calls.
   std::size_t before = 0;
   do {
     before = changed_.size();
@@ -101,7 +101,7 @@ void Interpreter::note_changes() {
   } while (changed_.size() > before);
 }
 
-/// A persistent that tasks share is one: what one of them sets, another one has.
+/// A persistent that tasks share is one variable: a value set by one task is seen by the others.
 void Interpreter::note_changes_by_tasks() {
   struct Shared {
     std::set<std::string> tasks;
@@ -187,7 +187,7 @@ std::optional<Interpreter::Part> Interpreter::constant_part(const Assignment& as
   if (!found || found->module != module || !is_literal(assignment.value)) return std::nullopt;
   const Declaration& declared = *found->declaration;
   const bool is_setting = declared.type == "tooldata" || declared.type == "wobjdata";
-  // A function comes in within expressions, whose order is not followed.
+  // Expressions call functions, and the reader does not follow the order within expressions.
   if (assignment.routine >= 0 &&
       modules_[module].routines[static_cast<std::size_t>(assignment.routine)].is_function)
     return std::nullopt;
@@ -268,8 +268,8 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
         instruction.name.starts_with("search") && at == 1 && argument.label.empty();
     if (instruction.name.starts_with("search") && !is_found_point) continue;
     const std::string type = type_of(argument, scope);
-    // Tools and work objects are handed to all kinds of instructions; they are changed by
-    // assignment, and by few.
+    // Tools and work objects are arguments of many instructions; only assignments and few
+    // instructions change them.
     const bool is_found = argument.label.empty() && at == tool_found_by(instruction.name);
     if (is_found && instruction.name == kFindsLoads) {
       if (const auto found = find(root->name, scope))

@@ -165,7 +165,7 @@ void Expressions::call(Expression& made, int depth) {
     made.parts.push_back(is_switch ? unknown() : expression(depth + 1));
     made.parts.back().label = label;
     if (is_switch || made.parts.back().kind != Kind::kUnknown) continue;
-    // One argument that is not understood leaves the others in their places.
+    // An argument that is not understood does not change the places of the others.
     while (!at_end() && !is_sign(",") && !is_sign("\\") && !is_sign(")") && !is_sign(";")) {
       const std::size_t before = at_;
       if (take("(")) skip_to_closing("(", ")");
@@ -175,7 +175,7 @@ void Expressions::call(Expression& made, int depth) {
   if (!take(")")) made.kind = Kind::kUnknown;
 }
 
-/// To the sign that closes what is open; the end of the statement at the latest.
+/// Moves to the sign that closes the open one; to the end of the statement at the latest.
 void Expressions::skip_to_closing(std::string_view opening, std::string_view closing) {
   for (int open = 0; !at_statement_end(); ++at_) {
     if (is_sign(opening)) ++open;
@@ -201,7 +201,7 @@ void Expressions::suffixes(Expression& made, int depth) {
       outer.parts.push_back(std::move(made));
       while (!at_end() && !is_sign("}") && !is_sign(";")) {
         outer.parts.push_back(expression(depth + 1));
-        // An index that is not understood is one that the program decides.
+        // An index that is not understood counts as decided by the program.
         while (!at_end() && !is_sign(",") && !is_sign("}") && !is_sign(";")) ++at_;
         take(",");
       }

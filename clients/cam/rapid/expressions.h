@@ -42,8 +42,8 @@ class Expressions {
   [[nodiscard]] std::uint32_t last_end() const {
     return at_ == 0 ? 0 : static_cast<std::uint32_t>(tokens_[at_ - 1].end);
   }
-  /// A word that begins or ends something wherever it stands: a statement that lacks its end goes
-  /// no further.
+  /// True for a word that begins or ends a statement wherever it is, so that an unfinished
+  /// statement ends there.
   [[nodiscard]] bool is_reserved() const;
   [[nodiscard]] bool at_statement_end() const { return at_end() || is_sign(";") || is_reserved(); }
   static bool is_operator(const std::string& text);

@@ -64,7 +64,8 @@ const std::map<std::string, std::vector<BuiltIn>>& built_in() {
   return kTypes;
 }
 
-/// `TASK2`, the folder of a backup that a module stands in; empty: it is of no backup.
+/// `TASK2`, the folder of a backup in which a module stands. Empty if the file belongs to no
+/// backup.
 std::string task_of(const std::string& file) {
   const std::size_t at = file.find("TASK");
   const std::size_t end = at == std::string::npos ? at : file.find('/', at);
@@ -116,8 +117,8 @@ Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector
   note_changes();
 }
 
-/// A file of several modules, or one that no controller takes: which of them a name means is not
-/// followed.
+/// Records a name declared twice, in a file of several modules or one that no controller accepts:
+/// the meaning of the name is not followed.
 void Interpreter::note_twice(std::size_t module, const Declaration& one, const Declaration& other) {
   const std::string why = fmt::format("{} is declared twice ({} line {}, line {})",
                                       shown(other.spelled.empty() ? other.name : other.spelled),
@@ -196,8 +197,7 @@ const std::vector<const Scope*>& Interpreter::scopes_of(std::size_t module, int 
     has_parameters |=
         declared.routine == routine && routine >= 0 && declared.storage == Storage::kParameter;
   }
-  // While the ways into a routine are looked for, a routine that calls itself sees none but its
-  // own.
+  // During the search for paths into a routine, a recursive routine sees only its own.
   ways.push_back(own);
   if (!has_parameters) return ways;
   const std::string& name = modules_[module].routines[static_cast<std::size_t>(routine)].name;

@@ -15,22 +15,22 @@
 /// The values of the expressions of a RAPID program, as far as they are constant.
 namespace trammel::cam::rapid {
 
-/// A value, or one clause that says why the program decides it at run time.
+/// A value, or one clause with the reason why the program decides it at run time.
 template <typename T>
 using Told = tl::expected<T, std::string>;
 [[nodiscard]] inline tl::unexpected<std::string> because(std::string why) {
   return tl::make_unexpected(std::move(why));
 }
 
-/// Where a name is looked up: a routine of a module, called from somewhere.
+/// The scope of a name: a routine of a module, and the call that entered it.
 struct Scope {
   std::size_t module = 0;
   int routine = -1;
-  const Instruction* call = nullptr;  ///< that hands over the parameters; nullptr: not known
+  const Instruction* call = nullptr;  ///< the call with the arguments; nullptr: not known
   const Scope* caller = nullptr;      ///< of `call`
 };
 
-/// An expression that stands in the program, with the scope that its names are looked up in.
+/// An expression in the program, with the scope of its names.
 struct Data {
   const Expression* node = nullptr;
   const Scope* scope = nullptr;
@@ -53,8 +53,8 @@ struct JointValue {
   int decimals = 0;
 };
 
-/// The assignments that hold for tools and work objects, by the part of them, `tframe.trans` as the
-/// numbers of its fields; nullptr: on some ways another one.
+/// The valid assignments to tools and work objects, by their part (`tframe.trans` as the numbers of
+/// its fields); nullptr: they differ between paths.
 using Settings =
     std::map<const Declaration*, std::map<std::vector<std::size_t>, const Assignment*>>;
 
@@ -69,7 +69,7 @@ constexpr double kNoAxis = 8.9e9;  ///< an external axis that is at 9E9 is not t
 
 class Interpreter {
  public:
-  /// `set_elsewhere`: persistents that tasks which are not read set, in lower case, with where.
+  /// `set_elsewhere`: persistents set by tasks that are not read, in lower case, with their places.
   Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules,
               std::map<std::string, std::string> set_elsewhere = {});
 
@@ -77,21 +77,21 @@ class Interpreter {
     const Declaration* declaration = nullptr;
     std::size_t module = 0;
   };
-  /// The declaration of a name: of the routine, of the module, or of any other module that does not
-  /// keep it to itself.
+  /// The declaration of a name: in the routine, in the module, or in another module where it is not
+  /// local.
   [[nodiscard]] std::optional<Found> find(const std::string& name, const Scope& scope) const;
-  /// The routine of that name which is called from a module: its module and number.
+  /// The routine with that name when called from a module: its module and number.
   [[nodiscard]] std::optional<std::pair<std::size_t, int>> find_routine(const std::string& name,
                                                                         std::size_t module) const;
-  /// Every way to come into a routine, at most some thousand: one where it has no parameters.
+  /// All paths into a routine, at most some thousand; one path for a routine without parameters.
   [[nodiscard]] const std::vector<const Scope*>& scopes_of(std::size_t module, int routine);
 
-  /// Why a declared value may be another one at run time; empty: it is never changed.
+  /// The reason why a declared value may change at run time; empty if it never changes.
   [[nodiscard]] std::string changed(const Declaration* declaration) const;
-  /// The persistents that these modules set and that other tasks may have too, in lower case, with
-  /// where.
+  /// The persistents that these modules set and that other tasks may share, in lower case, with
+  /// their places.
   [[nodiscard]] std::map<std::string, std::string> set_for_all_tasks() const;
-  /// Where a tool's load is found at run time (LoadId); empty: nowhere.
+  /// The place where a tool's load is measured at run time (LoadId); empty: nowhere.
   [[nodiscard]] std::string load_found(const Declaration* tool) const;
 
   /// True if an assignment gives a tool or work object a constant, which holds until the next one.
@@ -99,7 +99,7 @@ class Interpreter {
     return parts_.contains(&assignment);
   }
   void set(const Assignment& assignment, Settings& settings) const;
-  /// Sets what holds for the expressions that are asked for next.
+  /// Sets the settings for the expressions that are evaluated next.
   void assume(const Settings& settings) { now_ = &settings; }
 
   /// The value of an expression: its literal. Several where an index is not constant.
@@ -110,12 +110,12 @@ class Interpreter {
   [[nodiscard]] Told<TargetValue> target_of(const Expression& expression, const Scope& scope,
                                             int depth = 0) const;
   [[nodiscard]] Told<JointValue> joints_of(const Expression& expression, const Scope& scope) const;
-  /// `count` numbers of an aggregate or of what stands for one; `decimals`: raised to the most that
-  /// are written.
+  /// `count` numbers of an aggregate or of a name for one; `decimals`: raised to the largest number
+  /// of written decimals.
   [[nodiscard]] Told<std::vector<double>> numbers_of(const Expression& expression,
                                                      std::size_t count, const Scope& scope,
                                                      int* decimals, int depth = 0) const;
-  /// The type of what the expression stands for; empty: not known.
+  /// The type of the expression's value; empty: not known.
   [[nodiscard]] std::string type_of(const Expression& expression, const Scope& scope,
                                     int depth = 0) const;
   /// The argument that a parameter stands for; `expression` itself where it is none.
@@ -134,7 +134,7 @@ class Interpreter {
   [[nodiscard]] static bool is_shared(const Declaration& declared);
   void note_twice(std::size_t module, const Declaration& one, const Declaration& other);
   void note_change(const Expression& target, const Scope& scope, const std::string& why);
-  /// The part of a tool or work object of the same module that a constant is assigned to.
+  /// A part of a tool or work object in the same module to which a constant is assigned.
   struct Part {
     const Declaration* of = nullptr;
     std::vector<std::size_t> fields;
@@ -175,7 +175,7 @@ class Interpreter {
       routines_;  ///< by name, in their order
   std::map<const Declaration*, std::string> changed_;
   std::map<const Declaration*, std::string>
-      set_in_order_;  ///< where, of those that constants alone are assigned to
+      set_in_order_;  ///< the places of variables that only get constants
   std::map<const Assignment*, Part> parts_;
   const Settings* now_ = nullptr;
   mutable std::map<std::pair<const Declaration*, Settings::mapped_type>,

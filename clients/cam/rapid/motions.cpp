@@ -40,7 +40,8 @@ bool is_speed(const Expression& aggregate) {
   return !aggregate.parts.empty() && aggregate.parts.front().kind != Kind::kAggregate;
 }
 
-/// mm/s, of the tool: what `v100`, which a controller predefines, or a constant speeddata says.
+/// mm/s, of the tool: the value of `v100`, which a controller predefines, or of a constant
+/// speeddata.
 std::optional<double> speed_by(const Interpreter& meaning, const Expression& argument,
                                const Scope& scope) {
   const auto handed = meaning.handed_over(argument, scope);

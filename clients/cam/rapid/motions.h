@@ -8,11 +8,11 @@
 #include "clients/cam/rapid/interpreter.h"
 #include "clients/cam/rapid/syntax.h"
 
-/// The instructions of RAPID that move the tool, and what stands in them.
+/// The instructions of RAPID that move the tool, and their arguments.
 namespace trammel::cam::rapid {
 
-/// Instructions of the controller that move the tool to the targets which they are given. What is
-/// merely called alike, `MoveLOffset`, is a procedure of somebody's.
+/// True for instructions of the controller that move the tool to their targets. A similar name,
+/// `MoveLOffset`, is a user's procedure.
 [[nodiscard]] bool is_motion(const std::string& name);
 [[nodiscard]] bool is_search(const std::string& name);
 /// True if the tool goes to the target on a line or an arc.
@@ -20,7 +20,7 @@ namespace trammel::cam::rapid {
 /// `MoveC`, `TriggC`, `ArcC1Start`: the letter behind the kind of motion.
 [[nodiscard]] bool is_arc(const std::string& name);
 [[nodiscard]] bool has_label(const Instruction& instruction, std::string_view label);
-/// The argument that is a tool: one that is declared as such, or the last.
+/// The tool argument: one that is declared as a tool, or the last.
 [[nodiscard]] const Expression* tool_argument(const Interpreter& meaning, const Instruction& motion,
                                               const std::vector<const Expression*>& positional,
                                               const Scope& scope);

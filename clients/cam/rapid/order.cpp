@@ -62,11 +62,10 @@ class Order {
   }
 
  private:
-  /// The routines that a call may mean which names its routine at run time: those that nothing
-  /// calls by name.
+  /// The routines that a late-bound call may mean: those that no statement calls by name.
   std::vector<Step> late_routines() const {
     std::set<std::pair<std::size_t, int>>
-        by_name;  // and those that call so: one that calls itself has no beginning
+        by_name;  // and the late-bound callers: a routine that calls itself has no beginning
     bool any = false;
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       for (const Instruction& instruction : modules_[m].instructions) {

@@ -17,7 +17,7 @@ struct Place {
   const Assignment* assignment = nullptr;
 };
 
-/// The statements of all modules in a row, and what stands at each.
+/// The statements of all modules in sequence, and their places.
 [[nodiscard]] std::pair<std::vector<Step>, std::vector<Place>> steps_of(
     const std::vector<SourceFile>& files, const std::vector<Module>& modules,
     const Interpreter& meaning);

@@ -139,7 +139,7 @@ class Parser : private Expressions {
     while (!at_statement_end() && !is_sign(")")) ++at_;
     take(")");
   }
-  /// From the token `begin` to where the reading is.
+  /// Records the condition from the token `begin` to the present token.
   void note_condition(std::size_t begin) {
     module_.conditions.push_back(
         {tokens_[begin].begin, token().begin, routine_, tokens_[begin].line});
@@ -344,7 +344,7 @@ class Parser : private Expressions {
     if (take(":=")) {
       const std::size_t value_begin = token().begin;
       Expression value = expression();
-      // A value that is not understood changes its target all the same.
+      // A value that is not understood still changes its target.
       if (!is_sign(";")) value = {};
       module_.assignments.push_back({std::move(target), std::move(value), routine_, line,
                                      value_begin, 0, module_.instructions.size(),
@@ -379,7 +379,7 @@ class Parser : private Expressions {
       Expression argument;
       if (take("\\")) {
         const std::string label = take_word();
-        // `\WObj?w` hands on what the caller gives.
+        // `\WObj?w` passes on the caller's argument.
         if (take(":=") || take("?")) argument = expression();
         argument.label = label.empty() ? "?" : label;
       } else {

@@ -6,7 +6,7 @@
 
 namespace trammel::cam::rapid {
 
-/// Never fails: what is not understood is not there.
+/// Never fails: a part that is not understood is missing.
 [[nodiscard]] Module parse(std::string_view text);
 
 }  // namespace trammel::cam::rapid

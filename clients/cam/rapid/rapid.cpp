@@ -243,7 +243,7 @@ class Reader {
     return data.node->begin;
   }
 
-  /// A share of an axis' stiffness is taken away; where the tool is sent to stays the same.
+  /// Soft servo reduces an axis' stiffness; the commanded place stays the same.
   void note_soft_axes() {
     std::vector<std::string> places;
     for (std::size_t m = 0; m < modules_.size(); ++m) {
@@ -388,7 +388,7 @@ class Reader {
   std::map<std::pair<std::size_t, std::size_t>, Site> sites_;
   std::map<std::size_t, Scope> own_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
-  State state_;  ///< of the motion that is read
+  State state_;  ///< at the present motion
   bool goes_by_joints_before_ = false, undecided_confs_ = false;
 };
 

@@ -8,10 +8,11 @@
 
 namespace trammel::cam {
 
-/// Reads ABB RAPID modules (.mod .prg .sys) of one program. Targets are where motions go: declared,
-/// in arrays and records, written in the motion, `Offs` and `RelTool` of them with constant
-/// numbers, also through parameters of procedures. What a variable, a loop, a sensor or another
-/// module decides is left, with the reason. W of the controller is taken as the robot's base.
+/// Reads ABB RAPID modules (.mod .prg .sys) of one program. Targets are the ends of motions:
+/// declared, in arrays and records, written in the motion, `Offs` and `RelTool` of them with
+/// constant numbers, also through parameters of procedures. A target that a variable, a loop, a
+/// sensor or another module decides is left alone, with the reason. The controller's world counts
+/// as the robot's base.
 [[nodiscard]] Program read_rapid(std::vector<SourceFile> files, const ReadOptions& options);
 
 /// The declarations of modules, whether motions use them or not: tools, work objects and loads that

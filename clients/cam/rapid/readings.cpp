@@ -23,7 +23,7 @@ void Readings::find() {
   for (std::size_t m = 0; m < modules_.size(); ++m) note_readings(m);
 }
 
-/// The names in what motions go to: what becomes of them is told there.
+/// Names in the targets of motions are treated there.
 void Readings::note_names(const Expression& expression) {
   if (expression.kind == Kind::kName) named_.insert(expression.name);
   for (const Expression& part : expression.parts) note_names(part);
@@ -209,7 +209,7 @@ void Readings::add_reading(const Data& data, const Scope& at, const std::string&
                                              meaning_.place_of(at.module, line)));
     return;
   }
-  if (calls_routine_) return;  // what becomes of it is told there
+  if (calls_routine_) return;  // a reading by a called routine is treated there
   program_.readings.push_back(
       {file, {value.begin, value.end}, spelled, at.module, line, by, moves_});
 }

@@ -10,7 +10,7 @@
 #include "clients/cam/program.h"
 #include "clients/cam/rapid/interpreter.h"
 
-/// The statements that read targets of a RAPID program beside the motions that go to them.
+/// The statements of a RAPID program that read its targets, other than the motions to them.
 namespace trammel::cam::rapid {
 
 class Readings {
@@ -18,9 +18,9 @@ class Readings {
   Readings(const std::vector<Module>& modules, Interpreter& meaning, Program& program)
       : modules_(modules), meaning_(meaning), program_(program) {}
 
-  /// A motion goes to the target whose first byte it is.
+  /// Records that a motion goes to the target with this first byte.
   void add_place(std::size_t module, std::size_t begin) { places_.emplace(module, begin); }
-  /// The names in what motions go to: what becomes of them is told there.
+  /// Names in the targets of motions are treated there.
   void note_names(const Expression& expression);
   /// When all places are known.
   void find();
@@ -62,7 +62,7 @@ class Readings {
   bool calls_routine_ = false, moves_ = false;
   std::map<const Declaration*, std::string> read_;  ///< why the numbers of a target must stay
   std::map<const Declaration*, const Instruction*>
-      unknown_;  ///< that is given a target and may be a motion
+      unknown_;  ///< calls that get a target and may be motions
   struct Reference {
     std::size_t end = 0;
     std::string why;

@@ -10,7 +10,7 @@ namespace trammel::cam::rapid {
 
 namespace {
 
-/// From an instruction to another one the arm does not go where motions say.
+/// A pair of instructions between which the arm does not follow its motions.
 struct GiveWay {
   const char *begins, *label;  ///< empty label: with any
   const char* ends;            ///< as names of instructions begin
@@ -27,7 +27,7 @@ const std::array<GiveWay, 3>& give_ways() {
 
 }  // namespace
 
-/// Where a routine leaves targets displaced, all motions may be.
+/// If a routine ends with displaced targets, all motions may be displaced.
 void Setting::note_displacements() {
   for (std::size_t m = 0; m < modules_.size(); ++m) {
     std::map<int, std::string> open;

@@ -13,7 +13,7 @@
 /// The settings that instructions and assignments of RAPID make for the motions behind them.
 namespace trammel::cam::rapid {
 
-/// Tells whether the controller goes to the configuration of a target, or stays as near as it can.
+/// Whether the controller goes to the configuration of a target, or stays as near as possible.
 enum class Confs { kOn, kOff, kUndecided };
 
 /// The settings where a motion begins.
@@ -22,7 +22,7 @@ struct State {
   std::size_t displaced = 0;           ///< as Setting has the reason; 0: none
   std::size_t external_displaced = 0;  ///< the same
   std::array<std::size_t, 4>
-      given_way{};           ///< the same, where the arm does not go where motions say
+      given_way{};           ///< likewise, for instructions that take the arm away from its motions
   std::size_t settings = 0;  ///< as Setting numbers them
   Confs lines = Confs::kOn, axes = Confs::kOn;  ///< ConfL, ConfJ
   bool operator==(const State&) const = default;
@@ -33,7 +33,7 @@ class Setting {
   Setting(const std::vector<Module>& modules, Interpreter& meaning, Tools& tools)
       : modules_(modules), meaning_(meaning), tools_(tools) {}
 
-  /// Where a routine leaves targets displaced, all motions may be.
+  /// If a routine ends with displaced targets, all motions may be displaced.
   void note_displacements();
   void set(const Place& place, State& state);
   void join(State& state, const State& other, const std::string& by);

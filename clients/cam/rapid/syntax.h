@@ -9,11 +9,11 @@
 
 #include "clients/cam/flow.h"
 
-/// The content of a RAPID module, as far as targets need it. The whole language is not read: a
-/// statement that is not understood is passed over.
+/// The content of a RAPID module, as far as targets need it. The parser does not know the whole
+/// language: it skips statements that it does not understand.
 namespace trammel::cam::rapid {
 
-/// A text that takes a pointer where it is empty: most parts of a long program are numbers.
+/// A text that costs one pointer when it is empty: most parts of a long program are numbers.
 class Name {
  public:
   Name() = default;
@@ -62,7 +62,7 @@ struct Expression {
   Name name;         ///< of a name, a call, a field; the word of a truth value
   Name label;        ///< of an argument `\Rx:=...`: `rx`
   std::vector<Expression>
-      parts;  ///< elements, arguments, operands; of a field or element: what it is of, first
+      parts;  ///< elements, arguments, operands; for a field or element, its container comes first
 };
 
 enum class Storage { kConst, kPers, kVar, kParameter, kLoop };
@@ -87,7 +87,7 @@ struct Assignment {
   int line = 0;
   std::size_t begin = 0, end = 0;  ///< of the value
   std::size_t before = 0;          ///< which instruction of the module
-  std::size_t turns = 0;           ///< of the module, that stand above it
+  std::size_t turns = 0;           ///< of the module's statements above it
 };
 
 /// The condition of an IF, WHILE, TEST or FOR.
@@ -110,7 +110,7 @@ constexpr const char* kLateCall = "%";
 /// `MoveL p10,v100,fine,tool1\WObj:=wobj1;`, or a call of a procedure.
 struct Instruction {
   std::string name;     ///< in lower case
-  std::string spelled;  ///< as it stands there
+  std::string spelled;  ///< the text in the file
   std::vector<Expression> arguments;
   std::size_t begin = 0, end = 0;
   int routine = -1;
@@ -121,7 +121,7 @@ struct Routine {
   std::string name;
   bool local = false;
   bool is_function = false;
-  std::vector<std::string> parameters;  ///< in order, those with `\` left out
+  std::vector<std::string> parameters;  ///< in order, without those marked `\`
 };
 
 struct Record {
@@ -129,7 +129,7 @@ struct Record {
   std::vector<std::string> fields, types;
 };
 
-/// A PROC without its ENDPROC, or an ENDIF without its IF: the module is not whole.
+/// A PROC without its ENDPROC, or an ENDIF without its IF: the module is incomplete.
 struct Unbalanced {
   std::string what;  ///< a clause
   int line = 0;

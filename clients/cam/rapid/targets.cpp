@@ -39,7 +39,7 @@ Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>&
                                 const Data* place, ProgramTarget& target) const {
   const Told<TargetValue> value = meaning_.target_of(*data.node, *data.scope);
   if (!value) return because(value.error());
-  // Bytes that are reached through different callers must mean the same.
+  // A target must have the same meaning for all callers that reach it.
   for (const Use* use : uses) {
     if (use->data.node == data.node && use->data.scope == data.scope) continue;
     const Told<TargetValue> other = meaning_.target_of(*use->data.node, *use->data.scope);
@@ -61,7 +61,7 @@ Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>&
   return {};
 }
 
-/// The line above the statement that keeps what was folded.
+/// Adds a line above the statement that keeps the original expression.
 void Targets::note_original(const Site& site, const Data& place, ProgramTarget& target) const {
   keep_original(program_.files[site.module].text, site.statement, "!",
                 meaning_.text_of(*place.node, *place.scope), target);

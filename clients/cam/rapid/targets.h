@@ -12,7 +12,7 @@
 /// The targets where the motions of a RAPID program go.
 namespace trammel::cam::rapid {
 
-/// A motion goes to this place with this tool in this frame.
+/// A motion to a place, with its tool and its frame.
 struct Use {
   std::size_t tool = 0, frame = 0;
   const Instruction* motion = nullptr;
@@ -20,13 +20,13 @@ struct Use {
   std::size_t move = 0;  ///< of Program::moves
   Data data;
   std::string external_displaced =
-      {};  ///< why external axes are not where the target has them; empty: they are
+      {};  ///< why external axes may be at other values than in the target; empty: they are not
 };
 
-/// Bytes that hold a target, and what uses them.
+/// The bytes of a target, and their uses.
 struct Site {
   std::size_t module = 0;
-  std::size_t statement = 0;  ///< first byte of the statement that it stands in
+  std::size_t statement = 0;  ///< first byte of its statement
   std::string name;
   std::vector<Use> uses;
   bool joints = false;
@@ -42,8 +42,8 @@ class Targets {
   Told<void> read_joints(const Data& data, ProgramTarget& target);
   [[nodiscard]] Told<void> read_target(const Data& data, const std::vector<const Use*>& uses,
                                        const Data* place, ProgramTarget& target) const;
-  /// The motion once more, to another place of its configuration; empty where it does not stop at
-  /// its target, or does not stand alone in its line.
+  /// The same motion to another place in its configuration. Empty if the motion does not stop at
+  /// its target, or is not alone in its line.
   [[nodiscard]] std::vector<NewLine> another(const Use& use, bool joints) const;
   /// The line above the statement that keeps what was folded.
   void note_original(const Site& site, const Data& place, ProgramTarget& target) const;

@@ -24,8 +24,8 @@ bool is_same(const std::optional<StatedLoad>& a, const std::optional<StatedLoad>
   return a.has_value() == b.has_value() && (!a || (a->mass == b->mass && a->p_F == b->p_F));
 }
 
-/// The load that the flange bears: a gripped load, whose centre is given in the tool, and the
-/// tool's own where it is stated.
+/// The load on the flange: a gripped load, whose centre is given in the tool, plus the tool's own
+/// load if it is stated.
 StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& own,
                     const std::optional<Pose>& X_FT) {
   StatedLoad all = gripped;
@@ -88,7 +88,8 @@ std::size_t Tools::known_tool(ProgramTool tool) {
   return program_.tools.size() - 1;
 }
 
-/// The aggregate of `parts` parts that a part of a tool or work object is or stands for.
+/// The aggregate of `parts` parts that `of` is or stands for. `of` is a part of a tool or of a work
+/// object.
 Told<Data> Tools::aggregate(const Data& of, std::size_t parts) const {
   Data now = of;
   for (int depth = 0; now.node->kind != Kind::kAggregate && depth < 10; ++depth) {
@@ -128,8 +129,7 @@ Told<bool> Tools::truth(const Data& of) const {
   return data->front().node->name == "true";
 }
 
-/// The data for which an argument stands that names a tool or a work object; an error where it is
-/// not in the files.
+/// The data of a tool or work object that an argument names; an error if the files do not have it.
 Told<Data> Tools::named(const Expression& argument, const Scope& scope) const {
   const Told<std::vector<Data>> data = meaning_.data_of(argument, scope);
   if (!data) return because(data.error());
@@ -297,7 +297,7 @@ std::size_t Tools::load_set(std::size_t module, const Instruction& instruction) 
   return known_load(std::move(load));
 }
 
-/// The tool with what it carries: `\TLoad` says all of it, else GripLoad what comes to the tool's
+/// The tool with its load: `\TLoad` is the total load; otherwise GripLoad is added to the tool's
 /// own.
 std::size_t Tools::tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion,
                                  const Scope& scope) {

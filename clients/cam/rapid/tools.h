@@ -15,23 +15,23 @@ namespace trammel::cam::rapid {
 
 class Tools {
  public:
-  /// Adds what it finds to the tools and frames of `program`; frame 0 is wobj0.
+  /// Adds tools and frames to those of `program`; frame 0 is wobj0.
   Tools(Interpreter& meaning, const ReadOptions& options, Program& program);
 
-  /// The place in Program::tools of what an argument names.
+  /// The index in Program::tools of the tool that an argument names.
   std::size_t tool_of(const Expression& argument, const Scope& scope);
-  /// The place in Program::frames of what an argument names; nullptr: wobj0.
+  /// The index in Program::frames of the frame that an argument names; nullptr: wobj0.
   std::size_t frame_of(const Expression* argument, const Scope& scope);
   /// The load that `GripLoad lPart;` sets beside the tool's own; 0: none.
   std::size_t load_set(std::size_t module, const Instruction& instruction);
-  /// A load of which only this is known; a load that is not known already stays.
+  /// Marks a load as unknown, with this reason; a load that is unknown already stays.
   std::size_t undecided_load(std::size_t load, const std::string& why);
-  /// The tool with what it carries: `\TLoad` says all of it, else `gripped` what comes to the
-  /// tool's own.
+  /// The tool with its load: `\TLoad` is the total load; otherwise `gripped` is added to the tool's
+  /// own.
   std::size_t tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion,
                             const Scope& scope);
 
-  /// As a module declares it, whether motions use it or not.
+  /// The tool as a module declares it, with or without motions that use it.
   [[nodiscard]] ProgramTool declared_tool(const Data& data) const;
   [[nodiscard]] ProgramFrame declared_frame(const Data& data) const;
   [[nodiscard]] std::optional<StatedLoad> load_of(const Data& data) const;
@@ -46,12 +46,13 @@ class Tools {
   };
 
   std::size_t known_tool(ProgramTool tool);
-  /// The aggregate of `parts` parts that a part of a tool or work object is or stands for.
+  /// The aggregate of `parts` parts that `of` is or stands for. `of` is a part of a tool or of a
+  /// work object.
   [[nodiscard]] Told<Data> aggregate(const Data& of, std::size_t parts) const;
   [[nodiscard]] Told<Pose> pose(const Data& of, int* rotation_decimals) const;
   [[nodiscard]] Told<bool> truth(const Data& of) const;
-  /// The data for which an argument stands that names a tool or a work object; an error where it is
-  /// not in the files.
+  /// The data of a tool or work object that an argument names; an error if the files do not have
+  /// it.
   [[nodiscard]] Told<Data> named(const Expression& argument, const Scope& scope) const;
   void read_tool(const Data& data, ProgramTool& tool) const;
   void read_frame(const Data& parts, ProgramFrame& frame) const;
@@ -63,7 +64,7 @@ class Tools {
   Program& program_;
   std::vector<Load> loads_ = std::vector<Load>(1);
   std::map<const Expression*, std::size_t> tool_at_,
-      frame_at_;  ///< of Program::tools and frames, by what says them
+      frame_at_;  ///< of Program::tools and frames, by the expressions that name them
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
 };
 

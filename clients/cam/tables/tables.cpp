@@ -31,7 +31,7 @@ Token field_at(const std::string& text, std::size_t begin, std::size_t end, int 
   return {TokenKind::kWord, begin, end, line, std::string_view(text).substr(begin, end - begin)};
 }
 
-/// `;` where a line has one, else a tab, else `,`.
+/// The separator of a line: `;` if it has one, else a tab, else `,`.
 char separator_of(std::string_view line) {
   for (const char c : {';', '\t'}) {
     if (line.find(c) != std::string_view::npos) return c;
@@ -123,7 +123,7 @@ class Tables {
     }
   }
 
-  /// True if the row holds a pose. A row that does not is left as it is: a header, a remark.
+  /// True if the row holds a pose. Other rows stay unchanged: a header, a remark.
   bool read_row(std::size_t f, const Row& row, const Columns& columns) {
     ProgramTarget target;
     for (const std::size_t column : columns.at) {

@@ -12,8 +12,8 @@ namespace trammel::cam {
 [[nodiscard]] Program read_camrob(std::vector<SourceFile> files, const ReadOptions& options);
 
 /// RoboDK targets: a header that names `X,Y,Z` and `RX,RY,RZ` (deg, about X, Y, Z as they stand),
-/// `A,B,C` (KUKA) or `qw,qx,qy,qz`, in the robot's base or the frame `ROBODK` that the user gives.
-/// Without a header: X,Y,Z,RX,RY,RZ.
+/// `A,B,C` (KUKA) or `qw,qx,qy,qz`, in the robot's base or in the user's frame `ROBODK`. Without a
+/// header: X,Y,Z,RX,RY,RZ.
 [[nodiscard]] Program read_robodk(std::vector<SourceFile> files, const ReadOptions& options);
 
 }  // namespace trammel::cam

@@ -52,7 +52,7 @@ std::vector<Statement> statements_of(const Tokens& tokens, const Values& values)
                                 ? Step{Kind::kRoutine, name}
                                 : Step{Kind::kInterrupt, fmt::format("the thread {}", shown(name))},
                             at});
-      ++at;  // not a call of it
+      ++at;  // skips a name without a call
     } else if (const auto word = kWords.find(tokens[at].text); word != kWords.end()) {
       statements.push_back({{word->second}, at});
     } else if (tokens[at + 1].is("(")) {

@@ -7,23 +7,23 @@
 #include "clients/cam/flow.h"
 #include "clients/cam/urscript/values.h"
 
-/// The words of a script that decide the order, and the functions that move the robot or set
-/// something.
+/// The words of a script that control the order, and the functions that move the robot or change
+/// settings.
 namespace trammel::cam::urscript {
 
 /// The axes are commanded, and the tool may take any way.
 [[nodiscard]] bool is_of_axes(const Token& word);
 [[nodiscard]] bool is_motion(const Token& word);
-/// `servoj`, `freedrive_mode`: it moves the arm to where no pose says.
+/// `servoj`, `freedrive_mode`: the arm goes to a place that no pose gives.
 [[nodiscard]] bool is_followed(const Token& word);
 
 /// A statement.
 struct Statement {
   Step step;
   std::size_t at = 0;                ///< the token of its word
-  const Assignment* sets = nullptr;  ///< of a variable that has several constants
+  const Assignment* sets = nullptr;  ///< for a variable with several constants
 };
-/// In the order of the text; what an assignment calls comes before it.
+/// Statements in the order of the text; calls in an assignment come before it.
 [[nodiscard]] std::vector<Statement> statements_of(const Tokens& tokens, const Values& values);
 
 /// Why a script is not whole: `def`, `if` and `while` have an `end` each.

@@ -25,8 +25,8 @@ class Loads {
   [[nodiscard]] const Load& operator[](std::size_t number) const { return all_[number]; }
   /// The number of this load.
   std::size_t add(Load load);
-  /// `set_payload(40, [0, 0, 0.1])` and its like: all that the flange carries, kg and m. `at`:
-  /// where its name stands. `before`: what was set until then. `file`: the name of the script.
+  /// Reads `set_payload(40, [0, 0, 0.1])` and similar calls: the whole load of the flange, kg and
+  /// m. `at`: the place of the name. `before`: the load until then. `file`: the name of the script.
   std::size_t set(const Tokens& tokens, std::size_t at, std::size_t before,
                   const std::string& file);
 
@@ -44,7 +44,7 @@ class Tools {
   /// `set_tcp(p[...])`, or why its pose is not known.
   std::size_t set(const Told<Pose>& X_FT, const std::string& file, int line);
   std::size_t unknown(const std::string& why);
-  /// The tool as a motion has it, with what it carries.
+  /// The motion's tool with its load.
   std::size_t carrying(std::size_t tool, std::size_t load);
 
   [[nodiscard]] Loads& loads() { return loads_; }

@@ -32,9 +32,9 @@ using urscript::Told;
 using urscript::Value;
 
 constexpr Lexis kLexis = {"#", "\"'"};
-constexpr int kScriptDecimals = 6;  // of a place that the script did not write
+constexpr int kScriptDecimals = 6;  // for a place that the script did not write
 
-/// Moves the tool away from where motions say, from one function to another.
+/// A pair of functions between which the tool is moved away from its programmed motions.
 struct Superposed {
   std::set<std::string_view> begins, ends;
   const char* why;
@@ -126,7 +126,7 @@ class Script {
       leave_at(word, std::string(word.text), "it follows what is computed at run time");
   }
 
-  /// The controller takes the joints nearest to those before.
+  /// The controller takes the joints nearest to the previous ones.
   void note_order(const Flow& flow) {
     const auto before = motions_before(flow, [&](std::size_t s) -> std::optional<std::size_t> {
       if (const auto move = move_of_.find(s); move != move_of_.end()) return move->second;
@@ -178,7 +178,7 @@ class Script {
       state.load = loads.add({"set_payload", std::nullopt, "set_payload: " + why});
   }
 
-  /// Notes what else reads a target that is written anew: `b = hole`, `if hole[2] > 0.5:`.
+  /// Records other statements that read a rewritten target: `b = hole`, `if hole[2] > 0.5:`.
   void note_reading(std::size_t at) {
     if (!tokens_[at].is_word()) return;
     const auto variable = values_of_.variables().find(std::string(tokens_[at].text));
@@ -258,8 +258,8 @@ class Script {
     note_speed(at, next);
   }
 
-  /// `get_inverse_kin(p, qnear=q)`: what stands for its pose, and the joints that the motion is to
-  /// be near to. Returns why it is not known; empty: it is.
+  /// `get_inverse_kin(p, qnear=q)`: takes its pose, and the joints that the motion should be near.
+  /// Returns the reason why the value is unknown; empty: it is known.
   std::string take_inverse(Value& value, ProgramMove& move) const {
     const std::vector<Value> arguments = std::move(value.arguments);
     value = arguments[0];
@@ -317,8 +317,8 @@ class Script {
                 program_.moves.size() - 1, !is_of_axes(tokens_[at])});
   }
 
-  /// Commas between the arguments of the call that the last bracket closes: `, qnear=[0, 1]), 1.2)`
-  /// has one.
+  /// Number of commas between the arguments of the call that the last bracket closes: `, qnear=[0,
+  /// 1]), 1.2)` has one.
   static std::size_t commas_of_last_call(const Tokens& tokens) {
     std::size_t commas = 0;
     int depth = 0;
@@ -330,7 +330,7 @@ class Script {
     return commas;
   }
 
-  /// `movel(hole, a=1.2, v=0.05)` stops at its target where no `r` rounds it.
+  /// `movel(hole, a=1.2, v=0.05)` stops at its target if no `r` rounds it.
   void repeat(std::size_t at, const Value& value, bool joints) {
     if (!tokens_[at].is("movel") && !tokens_[at].is("movej")) return;
     const std::size_t end = std::min(text_.find_first_of("#\r\n", value.end), text_.size());
@@ -364,11 +364,11 @@ class Script {
   std::vector<Statement> statements_;
   urscript::Tools tools_;
   std::map<std::size_t, std::string> read_;     ///< why the numbers at a place must stay
-  std::size_t tool_ = 0;                        ///< of the motion that is read
+  std::size_t tool_ = 0;                        ///< at the present motion
   std::array<int, kSuperposed> superposed_{};   ///< the same
   std::map<std::size_t, std::size_t> move_of_;  ///< of Program::moves, by the step
   std::map<std::size_t, Value> values_;
-  std::map<std::size_t, Told<Pose>> poses_;  ///< of values that functions make
+  std::map<std::size_t, Told<Pose>> poses_;  ///< of values that functions compute
 };
 
 }  // namespace

@@ -47,14 +47,14 @@ void Values::note_block(std::size_t at) {
   if (tokens_[at].is("end") && !open_.empty()) open_.pop_back();
 }
 
-/// The token of the `def` or `thread` that is open; one behind all of them: none is.
+/// The token of the open `def` or `thread`; a number beyond all tokens if none is open.
 std::size_t Values::function_here() const {
   const auto own = std::find_if(open_.rbegin(), open_.rend(),
                                 [&](std::size_t block) { return defines(tokens_[block]); });
   return own == open_.rend() ? tokens_.size() : *own;
 }
 
-/// `global p1 = p[...]`; what is set in part is decided at run time.
+/// `global p1 = p[...]`; a partial assignment is decided at run time.
 void Values::note_assignment(std::size_t at) {
   if (!tokens_[at].is_word()) return;
   const bool first = at == 0 || tokens_[at - 1].line != tokens_[at].line ||
@@ -86,7 +86,7 @@ void Values::note_assignment(std::size_t at) {
   variable.in_order.push_back(variable.value);
 }
 
-/// `def drill(hole, depth=0.01):` hides what is called so elsewhere.
+/// `def drill(hole, depth=0.01):` hides variables of the same names elsewhere.
 void Values::note_parameters(std::size_t at) {
   if (!tokens_[at].is("def") || !tokens_[at + 2].is("(")) return;
   for (std::size_t next = at + 3; next < tokens_.size() && !tokens_[next].is(")"); ++next) {
@@ -98,8 +98,9 @@ void Values::note_parameters(std::size_t at) {
   }
 }
 
-/// A variable that constants alone are assigned to has each of them until the next, if all its
-/// assignments mean one variable: none is local, and they stand in one function or it is global.
+/// A variable that only gets constants has each of them until its next assignment. This needs all
+/// its assignments to mean one variable: none is local, and they are in one function or the
+/// variable is global.
 void Values::find_order(Variable& variable) {
   if (variable.in_order.size() < 2) return variable.in_order.clear();
   const bool is_one = !variable.is_local && (variable.is_global || variable.functions.size() < 2);

@@ -34,12 +34,12 @@ struct Value {
 struct Variable {
   Value value;
   std::string changed;
-  /// Constants that it is set to one after the other, each until the next; empty: `value` is its
+  /// The constants assigned to it in sequence, each valid until the next; empty: `value` is the
   /// only one.
   std::vector<Value> in_order = {};
-  bool is_global = false, is_local = false;  ///< as any of its assignments says
-  std::set<std::size_t> functions = {};      ///< that set it, by the token of their `def`
-  std::string set_again = {};                ///< where
+  bool is_global = false, is_local = false;  ///< as declared by any of its assignments
+  std::set<std::size_t> functions = {};      ///< functions that set it, by the token of their `def`
+  std::string set_again = {};                ///< the place of a second assignment
 };
 
 /// Which of its constants a variable that is set in order has; kUndecided: another one on each way.
@@ -63,17 +63,16 @@ struct Assignment {
 
 class Values {
  public:
-  /// Reads the tokens of a script, which is called `file` in reasons. Finds what its variables are
-  /// set to.
+  /// Reads the tokens of a script, named `file` in reasons, and finds the values of its variables.
   Values(const Tokens& tokens, std::string file);
 
   /// The value from a token on; `at` is set behind it.
   [[nodiscard]] Value value_at(std::size_t& at, int depth = 0) const;
   [[nodiscard]] bool ends_here(std::size_t at, int line) const;
-  /// `stored`: it was made before, when a variable may have been another one.
+  /// `stored`: the value was made earlier, when a variable may have had another value.
   [[nodiscard]] Told<Value> resolved(const Value& value, bool stored = false) const;
   [[nodiscard]] Told<Pose> pose_of_value(const Value& value, int depth, bool stored = false) const;
-  /// Sets what holds for the expressions that are asked for next; nullptr: not known.
+  /// Sets the settings for the expressions that are evaluated next; nullptr: not known.
   void assume(const Settings* settings) { now_ = settings; }
   [[nodiscard]] const std::map<std::string, Variable>& variables() const { return variables_; }
   /// Assignments to variables that are set in order, by the token behind them.
