@@ -59,7 +59,7 @@ std::string json_path_in(const CLI::App& app, const std::vector<std::string>& wo
   return "";
 }
 
-/// One line for each error, on standard error; as JSON, too, where that was asked for on standard
+/// Prints one line for each error on standard error; also JSON, if it was requested on standard
 /// output.
 int tell_errors(const CLI::App& app, const Error& error, const std::string& command,
                 const std::vector<std::string>& words) {

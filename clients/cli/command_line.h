@@ -10,11 +10,11 @@ namespace trammel::cli {
 
 class Action;
 
-/// All commands with their help, for `app`; what they do is put into `chosen`. Both outlive the
-/// parsing.
+/// Adds all commands with their help to `app`; parsing puts the chosen action into `chosen`. Both
+/// outlive the parsing.
 void make_command_line(CLI::App& app, Action& chosen);
 
-/// The program `trammel`: reads the command line, does what it says, writes errors to standard
+/// The program `trammel`: parses the command line, runs the command, writes errors to standard
 /// error. Returns the exit code: 0, 2 wrong usage, 3 refused data, 4 unreachable or busy service.
 [[nodiscard]] int run_command_line(int argc, const char* const* argv);
 

@@ -60,7 +60,8 @@ Result<client::CallContext> call_context(const ApplyArguments& arguments) {
   return context;
 }
 
-/// As a service is asked, too: what is computed here has the same bytes as what a service answers.
+/// Converts the pose as a request to a service, so that the result has the same bytes as a
+/// service's answer.
 exchange::AskedJoints asked_of(const PoseContext& pose, const std::vector<JointType>& types) {
   return {exchange::asked_from_si(pose.q, exchange::rails_of(types)),
           {pose.direction, pose.temperature, pose.time}};
@@ -118,8 +119,8 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   return Predictions{answer.model.id, std::move(answer.items), std::move(answer.model.notes)};
 }
 
-/// What --covariance and --orientation ask for. Refuses predictions of a model that did not learn
-/// orientations.
+/// Adds the columns of --covariance and --orientation. Refuses predictions of a model that did not
+/// learn orientations.
 Status add_uncertainties(Predictions& predictions, const ApplyArguments& arguments) {
   predictions.covariance = arguments.covariance;
   predictions.orientation = arguments.orientation;
@@ -163,11 +164,12 @@ struct CorrectArguments : ApplyArguments {
             service,     idle_axes, task,  pulses_per_deg, lead_in,      free_turn};
   }
 
-  /// True if the program chooses how the arm comes to the targets, for which it needs the model.
+  /// True if the program chooses the approach to the targets. It needs the model for that.
   [[nodiscard]] bool chooses() const { return lead_in || !free_turn.empty(); }
 };
 
-/// Corrects a table with one tool and payload; `ask` asks `model`, here or behind a service.
+/// Corrects a table with one tool and payload. `ask` requests the answers from `model`, here or at
+/// a service.
 Result<Corrections> correct_with(const CompensatedModel& model, const std::string& tool,
                                  const TargetFile& file, const CorrectArguments& arguments,
                                  const cam::AskTargets& ask) {
@@ -210,7 +212,7 @@ Result<Corrections> correct_here(const TargetFile& file, const CorrectArguments&
   return correct_with(model, tool, file, arguments, ask);
 }
 
-/// The service answers, and its model tells where gears have play and how the arm stands.
+/// The service answers. Its model states where gears have play, and the robot.
 Result<Corrections> choose_by_service(const TargetFile& file, const CorrectArguments& arguments) {
   return with_served_model<Corrections>(
       arguments.model, arguments.service,
@@ -347,7 +349,7 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
   return model;
 }
 
-/// Adds the options that say how a program is read.
+/// Adds the options for reading a program.
 void add_reading_options(CLI::App& command, std::string& format, std::string& frames,
                          std::vector<std::string>& idle_axes, std::string& task,
                          std::vector<double>& pulses_per_deg) {

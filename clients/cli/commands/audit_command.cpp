@@ -36,7 +36,7 @@ Result<std::vector<std::pair<std::string, AuditTrail>>> trails(const AuditArgume
   return all;
 }
 
-/// Every row that came is looked at here, too: a service may say what it likes.
+/// Checks the chain of every received row here as well, since a service may send anything.
 Status check_rows(const AuditTrail& trail) {
   if (trail.broken) return tl::make_unexpected(*trail.broken);
   const AuditRow* before = nullptr;

@@ -61,8 +61,8 @@ std::string in_words(const cam::ControllerCell& controller, const BackupArgument
   return text + (differing.empty() ? fmt::format("{} has all of it\n", arguments.compare) : "");
 }
 
-/// The robot file as it is to stand in the cell file: relative to it, unless the cell goes to
-/// standard output.
+/// The path of the robot file for the cell file: relative to it, unless the cell goes to standard
+/// output.
 std::string robot_in(const std::string& cell, const std::string& robot_path) {
   std::error_code error;
   const fs::path robot = fs::absolute(robot_path, error);
@@ -71,7 +71,7 @@ std::string robot_in(const std::string& cell, const std::string& robot_path) {
   return relative.empty() ? robot.string() : relative.string();
 }
 
-/// Which modules to take is for whoever asks to say, unless he has.
+/// Adds the advice to choose the modules, unless the user has chosen them.
 Error advised(Error error, const BackupArguments& arguments) {
   if (error.field == "tooldata" && error.next.empty())
     error.next = arguments.task.empty() ? "--task says of which task they are taken"
@@ -118,8 +118,8 @@ Result<RobotOfCell> robot_of(const BackupArguments& arguments,
   return RobotOfCell{found.arm, path, robot_yaml(found.arm, found.source), true};
 }
 
-/// The cell file and its robot file, as far as they are asked for; nothing where they would not be
-/// read again.
+/// The cell file and its robot file, as far as the user requests them. Empty if they could not be
+/// read back.
 Result<std::vector<OutputText>> cell_texts(const BackupArguments& arguments,
                                            const cam::ControllerCell& controller) {
   std::vector<OutputText> texts;

@@ -70,7 +70,7 @@ std::string batch_name(const std::string& batch) {
   return std::filesystem::path(batch).stem().string();
 }
 
-/// `next check: 2026-03-01; ...`; empty where nothing is said of it.
+/// `next check: 2026-03-01; ...`; empty if there is no date.
 std::string due_text(const nlohmann::ordered_json& check) {
   const auto text_of = [&](const char* key) {
     return check.contains(key) && check[key].is_string() ? check[key].get<std::string>()
@@ -81,8 +81,8 @@ std::string due_text(const nlohmann::ordered_json& check) {
   return fmt::format("next check: {}{}{}\n", due, due.empty() ? "" : "; ", because);
 }
 
-/// The actions for what changed, each once; what it does in millimetres stands in `why`. Empty
-/// where nothing changed, and of a server that does not say it.
+/// The actions for the changes, each once. `why` contains their effect in millimetres. Empty if
+/// nothing changed, or if the server does not send it.
 std::string actions_text(const nlohmann::ordered_json& check) {
   const auto budget = check.find("budget");
   if (budget == check.end() || !budget->is_object() || !budget->contains("lines") ||
@@ -104,7 +104,7 @@ std::string check_text(const nlohmann::ordered_json& check) {
          actions_text(check) + due_text(check);
 }
 
-/// The notes of the model that a service checked against, as warn_of_notes() tells them.
+/// Prints the notes of the model that a service checked against, as warn_of_notes() does.
 void warn_of_notes_in(const nlohmann::ordered_json& check) {
   if (!check.contains("notes") || !check["notes"].is_array()) return;
   for (const auto& note : check["notes"]) {
@@ -120,7 +120,7 @@ void warn_of_notes_in(const nlohmann::ordered_json& check) {
   }
 }
 
-/// kPart where --strict asks for a healthy robot and this one is not shown to be.
+/// kPart if --strict requires a healthy robot and this one is not shown to be healthy.
 Extent extent_of(const nlohmann::ordered_json& check, const CheckArguments& arguments) {
   if (!arguments.strict || check.at("verdict") == std::string(to_string(HealthVerdict::kHealthy)))
     return Extent::kAll;
@@ -142,7 +142,7 @@ Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of,
                       with_pages_beside(health_page(found.dump(), of), arguments.report));
 }
 
-/// Tells what earlier checks found.
+/// Prints the findings of earlier checks.
 Status tell_health(client::Session& session, const std::string& cell,
                    const CheckArguments& arguments) {
   const auto cells = TRY(health_at(session, cell, 0));
@@ -186,7 +186,7 @@ Result<Extent> check_at_service(const CheckArguments& arguments) {
   return extent_of(json, arguments);
 }
 
-/// The drift that earlier checks saw, read from files that `--json` wrote.
+/// The drift by earlier checks, read from files that `--json` wrote.
 Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& files) {
   std::vector<DriftSeen> all;
   for (const std::string& file : files) {

@@ -15,7 +15,7 @@ class App;
 /// one that the command line names is put into `chosen`.
 namespace trammel::cli {
 
-/// The part of its task that a command did. For kPart it has printed what is missing on standard
+/// The completed part of a command's task. For kPart it has printed the missing part on standard
 /// error.
 enum class Extent { kAll, kPart };
 
@@ -54,7 +54,8 @@ void add_store_command(CLI::App& app, Action& chosen);
 void add_robot_command(CLI::App& app, Action& chosen);    // export-robot
 void add_confirm_command(CLI::App& app, Action& chosen);  // confirm-robot
 void add_doctor_command(CLI::App& app, Action& chosen);
-/// help, completion, manual: of `app` as it is when they run; it outlives `chosen`.
+/// Adds help, completion and manual, which describe `app` as it is when they run; it outlives
+/// `chosen`.
 void add_help_commands(CLI::App& app, Action& chosen);
 void add_check_command(CLI::App& app, Action& chosen);
 void add_remedies_command(CLI::App& app, Action& chosen);

@@ -120,7 +120,7 @@ double rms_of(const ModelDifference& difference) {
   return std::sqrt(sum / static_cast<double>(difference.moved_B.size()));
 }
 
-/// Indices of the poses, those that moved most first.
+/// Indices of the poses by falling motion.
 std::vector<std::size_t> most_moved(const ModelDifference& difference) {
   std::vector<std::size_t> order(difference.moved_B.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;

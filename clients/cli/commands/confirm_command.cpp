@@ -49,8 +49,8 @@ std::string comparison_text(const RobotComparison& found) {
   return text;
 }
 
-/// A cell file says what the last comparison said. One that does not count takes nothing away that
-/// an earlier one confirmed, unless it shows that the file is wrong.
+/// Writes the result of the last comparison to the cell file. An invalid comparison does not remove
+/// an earlier confirmation, unless it shows that the file is wrong.
 Status note_in_cell(const ConfirmArguments& arguments, const Cell& cell,
                     const RobotComparison& found) {
   if (found.verdict == RobotComparison::Verdict::kCannotTell) return {};

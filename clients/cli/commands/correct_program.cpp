@@ -72,7 +72,7 @@ Result<cam::CorrectProgramOptions> options_of(const CorrectProgramArguments& arg
   return options;
 }
 
-/// A corrected program, and what the model's cell file says of robot, instrument and operator.
+/// A corrected program, with robot, instrument and operator from the model's cell file.
 struct Corrected {
   cam::CorrectedProgram program;
   CellPapers papers;
@@ -125,7 +125,7 @@ Result<Corrected> correct_by_service(const cam::Program& program,
 /// The text for each path that is written, standard output among them.
 using Texts = std::vector<TextFile>;
 
-/// The files, and beside each that is changed what it was before.
+/// The files, and beside each changed one its original.
 Texts texts_of(const ProgramFiles& before, const std::vector<cam::SourceFile>& after,
                const std::vector<bool>& keep_before, const std::vector<std::string>& paths) {
   Texts texts;
@@ -156,7 +156,8 @@ Status write_texts(const Texts& texts, const std::vector<std::string>& programs)
   return {};
 }
 
-/// Refuses a receipt, a page or a result for programs where a file of the program is, or comes.
+/// Refuses a receipt, a page or a JSON result whose path is also a file of the program, old or
+/// corrected.
 Status check_receipts_are_apart(const ProgramFiles& program, const std::vector<std::string>& paths,
                                 const CorrectProgramArguments& arguments) {
   Outputs receipts;

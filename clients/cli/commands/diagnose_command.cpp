@@ -37,7 +37,7 @@ constexpr const char* kSinceOnFiles =
 constexpr const char* kProveOnFiles =
     "give the cell file and the batch's file, and diagnose without --service";
 
-/// Proves for `minutes` from now, on all processors, shown as the share of that time.
+/// Runs the proof for `minutes` from now on all processors. The progress is the share of that time.
 ProveOptions proving(double minutes, ProgressLine& progress) {
   using Clock = std::chrono::steady_clock;
   const auto began = Clock::now();
@@ -80,7 +80,7 @@ Result<Applied> run_extension(const std::shared_ptr<const Cell>& cell, const Che
   return applied(cell, batch, diagnosis, options);
 }
 
-/// Where the extended list goes.
+/// The path of the extended list.
 const std::string& extended_cell(const DiagnoseArguments& arguments) {
   return arguments.cell_out.empty() ? arguments.cell : arguments.cell_out;
 }
@@ -103,7 +103,7 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
   return said;
 }
 
-/// Extends the model by the causes found. Writes it only where a service would put it in force.
+/// Extends the model by the causes found. Writes it only if a service would put it in force.
 Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                       const Diagnosis& diagnosis, const DiagnoseArguments& arguments,
                       ordered_json& json, Outputs& outputs) {
@@ -130,7 +130,7 @@ Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const
       arguments.apply ? held_out_to_extend(arguments.seed) : drawn(0, arguments.seed));
 }
 
-/// Says what was applied, or why nothing was.
+/// Reports the applied causes, or the reason why none was applied.
 Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) {
   if (applied.why_not.empty()) {
     say(extension_written(*applied.extension, arguments), arguments);
@@ -140,7 +140,7 @@ Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) 
   return Extent::kPart;
 }
 
-/// Tells what the repair since the model of --since did; its section of the page.
+/// Reports the effect of the repair since the model of --since; returns its section of the page.
 Result<std::string> tell_since(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                const DiagnoseArguments& arguments, ordered_json& json) {
   if (arguments.since.empty()) return std::string();

@@ -42,7 +42,7 @@ struct DoctorArguments {
 
 enum class State { kGood, kNote, kBad };
 
-/// A finding of one look, and what to do about it.
+/// A finding of one check, and its remedy.
 struct Found {
   std::string check;
   State state = State::kGood;
@@ -186,7 +186,7 @@ Found clock() {
   return {"clock", State::kGood, "synchronised", ""};
 }
 
-/// Half-written files of processes that are gone, in the folders that were named.
+/// Incomplete files of dead processes in the named folders.
 Found leftovers(const std::vector<fs::path>& folders) {
   std::vector<std::string> left;
   for (const fs::path& folder : folders) {
@@ -200,7 +200,7 @@ Found leftovers(const std::vector<fs::path>& folders) {
           fmt::format("delete them: rm {}", fmt::join(left, " "))};
 }
 
-/// Says which failures an acknowledged change survives with this record.
+/// Reports which failures an acknowledged change survives with this record.
 void look_at_record(const std::string& url, std::vector<Found>& found) {
   const auto store = Store::open(url);
   const RecordState record = store ? (*store)->record() : RecordState();
@@ -239,7 +239,7 @@ void look_at_store(const std::string& path, std::vector<Found>& found) {
                           : ""});
 }
 
-/// The text in lines beside `left`, which is as wide as they are indented.
+/// The text in lines beside `left`; later lines are indented by the width of `left`.
 std::string beside(const std::string& left, const std::string& text) {
   const std::string filled = std::string(left.size() - 1, '.') + " " + text;
   return left + wrapped(filled, left.size()).substr(left.size()) + "\n";

@@ -55,7 +55,7 @@ struct TrainArguments {
 };
 
 /// Checks the batch against the model to start from, as the service does before training. Only the
-/// refitted sources may differ: another difference would be learned as part of them.
+/// refitted sources may differ. Training would learn any other difference as part of them.
 Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit,
                     const Cell& cell, const CheckedBatch& batch) {
   TRY(check_may_start_from(from, cell, batch.rows(), refit));
@@ -137,7 +137,8 @@ Status train_model(const TrainArguments& arguments) {
     TRY(hold_against(*options.from, options.refit, cell, batch));
   }
   const auto shared = std::make_shared<const Cell>(std::move(cell));
-  // A model to start from has judged the batch, or somebody has looked at it.
+  // The batch needs no check if a model to start from has judged it, or if a person has looked at
+  // it.
   if (!arguments.as_read && arguments.from.empty())
     TRY(check_first_batch(shared, batch, arguments.level));
   const CompensatedModel model = TRY([&] {
@@ -173,8 +174,8 @@ struct EvaluateArguments {
   ServiceOptions service;
 };
 
-/// The note on what the sessions of a batch stand on for a model, for people; empty where nothing
-/// had to be found.
+/// The note on how sessions of a batch were placed for a model, for people; empty if none had to be
+/// placed.
 std::string located_text(const InWorld& world) {
   if (world.located.empty()) return "";
   return fmt::format(
@@ -190,8 +191,8 @@ std::string learned_text(std::ptrdiff_t poses) {
       poses);
 }
 
-/// On standard error, where results for programs may not hide it: figures of poses that are not
-/// this robot's say nothing.
+/// Warns on standard error, where results for programs do not hide it: figures at poses of another
+/// robot are meaningless.
 void warn_of_foreign_poses(const CompensatedModel& model, const MeasurementBatch& batch) {
   if (const auto foreign = foreign_poses(model, batch))
     std::fputs(shown_lines(fmt::format("warning: {}\n", *foreign)).c_str(), stderr);

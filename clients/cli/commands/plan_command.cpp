@@ -213,7 +213,7 @@ Status plan(PlanArguments arguments) {
   Result<Plan> planned = arguments.from.empty() ? make_plan(cell, arguments.options)
                                                 : plan_from(*cell, arguments.from);
   if (!planned) return tl::make_unexpected(planned.error());
-  // A batch is measured in the order of the program, so the plan has it, too.
+  // A batch is measured in the order of the program, so the plan gets the same order.
   if (arguments.writes_program() && !arguments.keep_order)
     planned = ordered_for_travel(cell->robot, std::move(*planned));
   Outputs outputs = TRY(outputs_of(*cell, arguments, *planned));

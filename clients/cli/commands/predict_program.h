@@ -19,7 +19,7 @@ struct PredictProgramArguments {
   std::vector<double> pulses_per_deg = {};  ///< of a Yaskawa job
 };
 
-/// A target that nothing can be said of makes it Extent::kPart.
+/// A target without a prediction makes it Extent::kPart.
 [[nodiscard]] Result<Extent> predict_program(const PredictProgramArguments& arguments);
 
 }  // namespace trammel::cli

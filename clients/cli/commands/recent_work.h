@@ -7,8 +7,8 @@
 
 namespace trammel::cli {
 
-/// The poses that a cell of a service was lately asked for, by its model in force and by another
-/// version beside it.
+/// The recently requested poses of a service's cell, predicted by its model in force and by another
+/// version.
 struct RecentWorkArguments {
   std::string model;             ///< `cell` or `cell@version`
   std::string json, next_poses;  ///< where to write; empty: nowhere

@@ -21,7 +21,7 @@ namespace trammel::cli {
 
 namespace {
 
-constexpr int kCheckPoses = 30;  // as many as tell the arm's lines when they are identified anew
+constexpr int kCheckPoses = 30;  // enough to identify the arm's lines anew
 
 struct RemediesArguments {
   std::string model, targets, output, json, check_poses;
@@ -64,7 +64,7 @@ nlohmann::ordered_json poses_json(const JointList& list) {
   return {{"columns", std::move(columns)}, {"poses", std::move(poses)}};
 }
 
-/// Tells how to see afterwards whether it helped.
+/// Explains how to verify the repair afterwards.
 std::string proof_text(const RemediesArguments& arguments) {
   return fmt::format(
       "afterwards: measure the poses of {}, then trammel diagnose --cell CELL --batch AFTER "

@@ -19,8 +19,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kTold = 10;        // of those that differ, the largest
-constexpr double kAnotherBranch = 1e-3;  // rad, of a joint whose pose is the same
+constexpr std::size_t kTold = 10;        // listed differences, the largest first
+constexpr double kAnotherBranch = 1e-3;  // rad, the largest difference of a joint within one branch
 
 struct ReplayArguments {
   std::string model, json, next_poses;
@@ -43,11 +43,11 @@ struct Replayed {
   std::size_t requests = 0, items = 0, different = 0;
   double largest_mm = 0;
   std::vector<Different> told;        ///< the largest first
-  std::set<std::string> models;       ///< that answered then
+  std::set<std::string> models;       ///< the models that answered the recorded requests
   std::set<std::string> models_now;   ///< likewise, by hash
   std::size_t of_other_models = 0;    ///< requests that another model answered then
-  std::set<std::string> other_cells;  ///< that the records have beside the model's
-  std::vector<DamagedLines> damaged;  ///< by what was given to read
+  std::set<std::string> other_cells;  ///< cells of the records other than the model's
+  std::vector<DamagedLines> damaged;  ///< by the given file or folder
   std::vector<std::string> half;      ///< last lines that were not written to their ends
 };
 
@@ -91,7 +91,7 @@ std::vector<double> in_radians(std::vector<double> joints_deg, const exchange::R
   return joints_deg;
 }
 
-/// rad; infinite where there are not as many of them.
+/// rad; infinite for different numbers of joints.
 double joints_apart(const std::vector<double>& a, const std::vector<double>& b) {
   if (a.size() != b.size()) return INFINITY;
   double most = 0;
@@ -136,12 +136,13 @@ void note(Replayed& all, const RecordedCall& call, std::size_t item, Different d
   if (all.told.size() > kTold) all.told.pop_back();
 }
 
-/// Who answers now: predictions and corrections of one recorded request, and the hash of the model.
+/// The present answers: predictions and corrections for one recorded request, and the hash of the
+/// model.
 struct Answers {
   std::string hash;
   std::vector<exchange::Prediction> predictions;
   std::vector<exchange::CorrectedTarget> corrections;
-  exchange::Rails rails = {};  ///< as the joints of the corrections are told
+  exchange::Rails rails = {};  ///< for the joints of the corrections
 };
 using Ask = std::function<Result<Answers>(const RecordedCall&)>;
 
@@ -261,7 +262,7 @@ ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
       {"largest", told}};
 }
 
-/// Without records: what the service was lately asked.
+/// Without records: replays the recent requests of the service.
 Result<Extent> replay_recent(const ReplayArguments& arguments) {
   if (!arguments.service.service)
     return failure(ErrorCode::kUsage, "either files of recorded requests, or --service")

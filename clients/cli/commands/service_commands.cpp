@@ -44,8 +44,7 @@ Extent extent_of(const client::JobStatus& job) {
   return job.model_version == 0 || put_in_force(job) ? Extent::kAll : Extent::kPart;
 }
 
-/// Notes for users of a version; 0: of the version in force. Nothing where the service does not
-/// say.
+/// Notes for users of a version; 0: of the version in force. Empty if the service sends none.
 Result<std::vector<Note>> notes_of_version(client::Session& session, const std::string& cell,
                                            int version) {
   const std::vector<exchange::ModelInfo> models = TRY(session.models(cell));
@@ -128,7 +127,7 @@ bool is_checked(const ordered_json& cell) {
   return cell.contains("verdict") && cell["verdict"].is_string();
 }
 
-/// The part that a server that answers plays besides, as far as it says so.
+/// The additional role of an answering server, as far as it states it.
 ordered_json part_of(const std::string& server, const std::vector<ordered_json>& answers) {
   ordered_json part = {{"serves", true}, {"trains", nullptr}, {"reachable", true}};
   for (const ordered_json& answer : answers)
@@ -137,12 +136,12 @@ ordered_json part_of(const std::string& server, const std::vector<ordered_json>&
   return part;
 }
 
-/// The record of the servers, as the first of them says.
+/// The record of the servers, from the first of them that has it.
 ordered_json record_of(const std::vector<ordered_json>& answers) {
   return answers.empty() ? ordered_json() : answers.front().value("record", ordered_json());
 }
 
-/// The servers of the record, as the first says that can; null: none can.
+/// The servers of the record, from the first answer that lists them. Null if no answer does.
 ordered_json fleet_of(const std::vector<ordered_json>& answers) {
   for (const ordered_json& answer : answers)
     if (answer.contains("servers") && answer["servers"].is_array()) return answer["servers"];
@@ -156,7 +155,7 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   const std::vector<ordered_json> health = cells_of(answers);
   const ordered_json record = record_of(answers);
   const bool is_away = record.contains("reachable") && record["reachable"] == false;
-  std::vector<client::BatchOfService> apart;  // these two stand in the record
+  std::vector<client::BatchOfService> apart;  // both come from the record
   std::vector<client::DatedJob> jobs;
   if (!is_away) {
     apart = TRY(session.quarantine(""));
@@ -237,8 +236,8 @@ Result<std::optional<int>> version_in_force(client::Session& session, const std:
   return models.front().version == 1 ? std::optional(0) : std::nullopt;
 }
 
-/// A change that is refused where another version is in force than the user saw or, where that is
-/// not said, than there is now.
+/// The options of a change. It is refused if the version in force is not the version that the user
+/// saw. Without a stated version, the present one counts.
 Result<client::ChangeOptions> decided_against(client::Session& session, const std::string& cell,
                                               const ServiceArguments& arguments) {
   client::ChangeOptions change;
@@ -253,7 +252,7 @@ Result<client::ChangeOptions> decided_against(client::Session& session, const st
 using BatchChange = Status (client::Session::*)(const std::string&, const std::string&,
                                                 const client::ChangeOptions&);
 
-/// `now`: what the batch is afterwards.
+/// `now`: the state of the batch afterwards.
 Status change_batch(client::Session& session, const ServiceArguments& arguments, BatchChange change,
                     const char* now) {
   const std::string cell = TRY(cell_id(arguments.cell));
@@ -279,8 +278,8 @@ Status cancel(client::Session& session, const ServiceArguments& arguments) {
   return write_json(arguments.json, {{"job", arguments.job}, {"is", "cancelled"}});
 }
 
-/// The model in force in the cell, as the service tells it, with the figures it was judged by; null
-/// where it tells none.
+/// The cell's model in force by the service, with its figures against the former one; null if the
+/// service sends none.
 ordered_json in_force_at(client::Session& session, const std::string& cell) {
   const auto cells = health_at(session, cell, 1);
   if (!cells) return nullptr;
@@ -292,7 +291,7 @@ ordered_json in_force_at(client::Session& session, const std::string& cell) {
 Status now_in_force(client::Session& session, const std::string& cell, int version,
                     const ServiceArguments& arguments) {
   ordered_json now = in_force_json(cell, version, in_force_at(session, cell));
-  // The change is made: what cannot be asked afterwards is no failure of it.
+  // The change is made; a failed request afterwards does not undo it.
   const std::vector<Note> notes =
       notes_of_version(session, cell, version).value_or(std::vector<Note>());
   now["notes"] = notes_json(notes);
@@ -370,8 +369,8 @@ class ServiceCommands {
  public:
   ServiceCommands(CLI::App& app, Action& chosen) : app_(app), chosen_(chosen) {}
 
-  /// A command whose action opens a session and hands it to `talk`, a function of the session and
-  /// the arguments that answers as an Action does. Its options are added by `add_options`.
+  /// A command whose action opens a session and calls `talk` with the session and the arguments;
+  /// `talk` returns like an Action. `add_options` adds its options.
   template <typename Talk, typename AddOptions>
   void add(const char* name, const char* description, Talk talk, AddOptions add_options) {
     const auto arguments = std::make_shared<ServiceArguments>();
@@ -442,7 +441,7 @@ void add_running_jobs(ServiceCommands& commands) {
       });
 }
 
-/// Adds the commands for what is in force, for what may be learned from, and for model files.
+/// Adds the commands for the version in force, for quarantine, and for model files.
 void add_model_changes(ServiceCommands& commands) {
   commands.add("activate", "Put a stored version of a cell's model in force", activate,
                [](CLI::App& command, ServiceArguments& arguments) {

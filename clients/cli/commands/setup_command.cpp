@@ -37,7 +37,7 @@ struct SetupArguments {
   std::uint64_t seed = 1;
 };
 
-/// What the folder says of the cell, and what it does not.
+/// What the folder states about the cell, and what is missing.
 struct Proposal {
   cam::ControllerCell controller;
   cam::Dialect dialect = cam::Dialect::kRapid;
@@ -68,7 +68,7 @@ Result<cam::Program> program_in(const SetupArguments& arguments, cam::Dialect& d
   return understood_program(files, std::move(options), "");
 }
 
-/// By the controller's own files, where the folder has them, else by its program.
+/// Uses the controller's own files if the folder has them, else its program.
 Result<Proposal> read_folder(const SetupArguments& arguments) {
   Proposal proposal;
   Result<cam::Program> program = program_in(arguments, proposal.dialect);
@@ -312,7 +312,7 @@ std::string in_words(const SetupArguments& arguments, const Proposal& proposal,
   return text;
 }
 
-/// A cell that somebody has worked on stays, and a backup stays what the controller has.
+/// Refuses to write over an existing cell, or into the folder of the backup that is read.
 Status check_place(const SetupArguments& arguments) {
   std::error_code error;
   if (!fs::is_directory(arguments.folder, error))

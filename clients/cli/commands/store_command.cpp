@@ -110,7 +110,7 @@ nlohmann::ordered_json json_of(const std::vector<CellInRecord>& cells) {
   return list;
 }
 
-/// Who gives a command, for the audit trail.
+/// The user who runs the command, for the audit trail.
 std::string who_asks() {
   const ::passwd* user = ::getpwuid(::getuid());
   return fmt::format("{} by trammel store describe",

@@ -12,7 +12,7 @@ namespace {
 
 struct StudyArguments {
   std::string name, json;
-  std::string cell, truth;  // empty: what ships
+  std::string cell, truth;  // empty: the shipped ones
   std::optional<std::string> bias;
   std::uint64_t seed = 1;
 };

@@ -8,7 +8,7 @@
 #include "server/base/result.h"
 #include "server/robot/chain.h"
 
-/// The folder that a controller was backed up to.
+/// The folder with the backup of a controller.
 namespace trammel::cli {
 
 struct BackupPlace {
@@ -35,8 +35,9 @@ struct BackupRobot {
   Chain arm;
   std::string source;
 };
-/// By the lengths that the controller tells, else the shipped robot of the type that it names, with
-/// what its maker measured at it. Refuses with the type where neither is there.
+/// Builds the robot from the controller's lengths, if it states them. Otherwise takes the shipped
+/// robot of the stated type, with the maker's measurements of the individual robot. Refuses, with
+/// the type, if there is neither.
 [[nodiscard]] Result<BackupRobot> robot_of_backup(const cam::ControllerCell& controller);
 
 }  // namespace trammel::cli

@@ -7,8 +7,8 @@
 
 namespace trammel::cli {
 
-/// read_cell() for a command that trains. Refuses also what the training would refuse of the file's
-/// own `model`, as far as it is used.
+/// read_cell() for a command that trains. Also refuses the parts of the file's own `model` that the
+/// training would use and refuse.
 [[nodiscard]] Result<Cell> read_cell_to_train(const std::string& path, SpecUse use = {});
 
 }  // namespace trammel::cli

@@ -47,7 +47,7 @@ const std::array<NotRead, 5>& not_read() {
   return kAll;
 }
 
-/// A sentence for each kind of file in the folder that the dialect leaves out.
+/// One sentence for each kind of file in the folder that the dialect does not read.
 std::vector<std::string> left_unread(cam::Dialect dialect, const std::string& folder) {
   std::vector<std::string> sentences;
   for (const NotRead& kind : not_read()) {

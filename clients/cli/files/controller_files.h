@@ -21,12 +21,12 @@ constexpr std::size_t kLargestProgram = std::size_t{1} << 28;  ///< bytes of a f
 /// and its folders System, Mada and Steu, ABB's system modules and parameters.
 [[nodiscard]] bool is_of_the_controller(const std::string& name);
 
-/// The files of a folder that are called so (in lower case), by their paths in it, sorted.
+/// The files of a folder with these names (in lower case), by their paths in it, sorted.
 [[nodiscard]] Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names,
                                                                 const std::string& folder);
 
-/// Adds what a folder has beside its programs, for their dialect: parameters, lists of frames and
-/// tools, and sentences on what is not read.
+/// Adds a folder's files beside its programs, for their dialect: parameters, lists of frames and
+/// tools, and sentences on files that are not read.
 [[nodiscard]] Status read_values(const std::string& folder, ProgramFiles& program);
 
 /// True if --frames names a controller's own list, or one that it keeps in binary form.

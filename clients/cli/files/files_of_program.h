@@ -9,7 +9,7 @@
 
 namespace trammel::cli {
 
-/// The files of one program, and what was found beside them.
+/// The files of one program, and related files found beside them.
 struct ProgramFiles {
   cam::Dialect dialect = cam::Dialect::kRapid;
   std::vector<cam::SourceFile> files;
@@ -19,11 +19,11 @@ struct ProgramFiles {
   std::set<std::string> system = {};     ///< names of files that belong to the controller and were
                                          ///< found in a folder: read, not written
   std::vector<cam::SourceFile> parameters = {};  ///< MOC.cfg of an ABB backup that a folder is
-  std::string task = {};  ///< of RAPID, whose modules were taken; empty: of all
+  std::string task = {};  ///< for RAPID: modules of this task were taken; empty: all tasks
   std::vector<cam::SourceFile> beside =
       {};  ///< read for values alone: other tasks, lists of frames and tools
   std::vector<std::string> not_read =
-      {};  ///< what speaks of the robot and is not read: a sentence each
+      {};  ///< files about the robot that are not read: one sentence each
 };
 
 }  // namespace trammel::cli

@@ -35,7 +35,7 @@ bool differ_by_one(std::string_view a, std::string_view b) {
   return swapped || (a.size() <= 1 && b.size() <= 1);
 }
 
-/// A column that is nearly another one.
+/// A column with a name that is nearly the name of another one.
 struct NearColumn {
   std::string column, meant;
 };

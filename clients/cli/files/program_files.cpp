@@ -33,8 +33,8 @@ struct Found {
   std::string name, path;
 };
 
-/// By its ending; `.dat` is KRL only where it looks like it, since FANUC's and Yaskawa's
-/// controllers have such files too.
+/// The dialect by the ending. `.dat` is KRL only if its content looks like it, since FANUC's and
+/// Yaskawa's controllers have such files too.
 std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
   const auto dialect = cam::dialect_of_file(path);
   const std::string ending = fs::path(path).extension().string();
@@ -104,7 +104,7 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
-/// Refuses a file of which nobody says what it is.
+/// Refuses a file of unknown kind.
 Status check_kind(const std::string& path, bool is_said) {
   if (lower(fs::path(path).extension().string()) == kOfPolyScope)
     return refused("PolyScope's own program is not read")
@@ -128,7 +128,7 @@ bool is_program(const std::vector<std::string>& inputs, const std::string& forma
 
 namespace {
 
-/// The programs of a folder join `found`; those of other tasks stand beside them.
+/// Adds the programs of a folder to `found`; those of other tasks go beside them.
 Status take_folder(const std::string& folder, const std::optional<cam::Dialect>& wanted,
                    ProgramFiles& program, std::vector<Found>& found) {
   std::vector<Found> inside = programs_in(folder, wanted);
@@ -208,7 +208,7 @@ struct GivenPose {
   std::string name;
   Pose X;
   int line = 0;
-  bool may_be_unused = false;  ///< it is for other programs
+  bool may_be_unused = false;  ///< its row may belong to other programs
 };
 
 Result<bool> may_be_unused(const CsvTable& table, std::size_t row) {
@@ -242,14 +242,14 @@ Result<std::vector<GivenPose>> read_frames_csv(const std::string& path) {
   return rows;
 }
 
-/// Refuses rows that do not reach the program: whoever wrote them believes that they do.
+/// Refuses rows without effect on the program, since their author expects one.
 Status check_used(const std::vector<GivenPose>& rows, const std::string& path,
                   const cam::Program& program, cam::Dialect dialect) {
   const cam::FramesRows known = cam::rows_of(program);
   std::vector<Error> problems;
   for (const GivenPose& row : rows) {
     const bool spelled = cam::may_have_row(dialect, row.name);
-    // Behind what is left nobody looks for its frame.
+    // The frame of an item that is left alone is not searched.
     const bool hidden = spelled && !program.left.empty() && known.open.empty();
     if (row.may_be_unused || hidden || known.used.contains(row.name)) continue;
     std::set<std::string> names = known.used;

@@ -10,7 +10,7 @@
 
 namespace trammel::cli {
 
-/// Joints that a service was asked about, and what it answered, as far as that is recorded.
+/// Joints of a request to a service, and the recorded answer.
 struct RecordedPose {
   exchange::AskedJoints asked;
   exchange::Prediction answer;
@@ -39,14 +39,14 @@ struct RecordedCall {
 struct DamagedLines {
   std::size_t count = 0;
   Error first;  ///< with file and line
-  /// Last lines without an end, as a service leaves one that is writing or was killed: `a.jsonl row
-  /// 7`. Not counted.
+  /// Incomplete last lines, which a service leaves while it writes or when it is killed: `a.jsonl
+  /// row 7`. Not counted.
   std::vector<std::string> half;
 };
 
-/// Calls `take` for each request of the file, or of all files of the folder, in their order. A last
-/// line that was not written to its end is left out and told. Refuses where no line is a record,
-/// with the first file and line.
+/// Calls `take` for each request of the file, or of all files of the folder, in order. An
+/// incomplete last line is skipped and reported. Refuses if no line is a record, and names the
+/// first file and line.
 [[nodiscard]] Result<DamagedLines> read_records(
     const std::string& path, const std::function<Status(const RecordedCall&)>& take);
 

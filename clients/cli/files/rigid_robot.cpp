@@ -73,7 +73,8 @@ Eigen::VectorXd as_numbers(const ArmState& state, const std::vector<LinkGeometry
                                            static_cast<Eigen::Index>(numbers.size()));
 }
 
-/// True if the source moves links, base and tool by the same at all these poses, and nothing else.
+/// True if the only effect of the source is to move links, base and tool by constant amounts at all
+/// these poses.
 bool is_rigid(const PhysicalModel& all, std::size_t source, const std::vector<PoseContext>& poses) {
   const PhysicalModel alone = only(all, source);
   std::map<std::string, Eigen::VectorXd> first;  // of each tool

@@ -12,8 +12,8 @@ namespace trammel::cli {
 
 /// The part of a model that rigid kinematics leaves out.
 struct LeftOut {
-  std::string source;        ///< as a list of error sources has it; `bias` is what was learned
-  std::string plain;         ///< for people
+  std::string source;  ///< in the spelling of a list of error sources; `bias` is the learned part
+  std::string plain;   ///< for people
   double rms = 0, most = 0;  ///< m, how far it moves the tool at poses drawn in the model's domain
 };
 
@@ -26,10 +26,10 @@ struct RigidRobot {
   std::map<std::string, Pose> tools;     ///< X_FT, calibrated
   std::vector<LeftOut> left_out;
   double rms = 0, most = 0;  ///< m, of all that is left out together
-  int poses = 0;             ///< at which the sizes were found
+  int poses = 0;             ///< the number of poses for the sizes
 };
 
-/// Poses are drawn between the joints that the model was trained with, the same ones every time.
+/// Poses are drawn from the joint ranges of the model's training, always the same ones.
 [[nodiscard]] RigidRobot rigid_robot(const CompensatedModel& model);
 
 }  // namespace trammel::cli

@@ -118,7 +118,7 @@ Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& thr
     if (said && unit == 1.0) break;
     const std::vector<Vector3> angles = TRY(vectors(columns, three, unit));
     for (const ThreeNumbers& way : ways_of_three_numbers()) {
-      if (way.columns.empty()) continue;  // no controller shows it so
+      if (way.columns.empty()) continue;  // no controller shows this form
       ShownPoses::Orientations read{
           fmt::format("{} {} {}, {}", columns.table().columns()[three[0]],
                       columns.table().columns()[three[1]], columns.table().columns()[three[2]],

@@ -19,10 +19,11 @@ namespace {
 
 constexpr double kPositionLimitMm = 1e6;
 constexpr int kHighestConf = 7;
-constexpr double kLargestMetres = 10;  // no arm reaches as many metres, and none its own foot in mm
+constexpr double kLargestMetres = 10;  // no arm reaches this far in m, and every arm reaches
+                                       // farther in mm
 constexpr double kNearestShareOfReach = 0.01;  // of the targets in the middle
 
-/// m, of all its links; a gantry has none that says how far it goes.
+/// m, of all its links; 0 for a gantry, whose links do not limit its reach.
 double arm_length(const Chain& robot) {
   double length = 0;
   int rails = 0;

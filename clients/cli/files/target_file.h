@@ -13,14 +13,14 @@ namespace trammel::cli {
 struct TargetRow {
   int row = 0;
   exchange::AskedTarget target;
-  std::vector<std::string> fields = {};  ///< as they stand there, one a column
+  std::vector<std::string> fields = {};  ///< the texts in the file, one per column
 };
 
 struct TargetFile {
   std::string where;
   std::vector<JointType> joint_types;  ///< of the joint columns; empty when there are none
   std::vector<TargetRow> rows;
-  std::vector<std::string> columns = {};  ///< of the file, all of them
+  std::vector<std::string> columns = {};  ///< all columns of the file
 };
 
 /// Reads targets (CSV, mm and deg): `x_mm,y_mm,z_mm,qw,qx,qy,qz` (X_BT) with `conf` (0..7) or
@@ -36,9 +36,9 @@ struct TargetFile {
 /// The refusal of such a file.
 [[nodiscard]] Error looks_like_metres(const TargetFile& file);
 
-/// Refuses joint and direction columns that are not the robot's, conf where the robot's branches
-/// have no closed form, and positions that all may be metres where the one in the middle is within
-/// a hundredth of the arm's length.
+/// Refuses joint and direction columns that do not belong to the robot, and conf if the robot's
+/// branches have no closed form. Refuses positions that are all small enough for metres, if their
+/// median is within a hundredth of the arm's length.
 [[nodiscard]] Status check_targets(const TargetFile& file, const Chain& robot);
 
 }  // namespace trammel::cli

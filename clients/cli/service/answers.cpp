@@ -48,7 +48,7 @@ void each_column(std::string_view names, const Value& value, const Take& take) {
   }
 }
 
-/// The same of the figures of an answer that stand at this place of a table.
+/// As above, for the figures of an answer at this place of a table.
 template <typename Figures, typename Answer, typename Take>
 void each_column_at(exchange::Place place, const Figures& figures, const Answer& answer,
                     const Take& take) {
@@ -76,7 +76,7 @@ ordered_json pose_json(const exchange::Pose& pose) {
   return json;
 }
 
-/// Adds the figures of an answer that stand at one of these places.
+/// Adds the figures of an answer at one of these places.
 template <typename Figures, typename Answer>
 void put_figures(const std::set<exchange::Place>& places, const Figures& figures,
                  const Answer& answer, ordered_json& json) {
@@ -95,8 +95,8 @@ void put_figures(const std::set<exchange::Place>& places, const Figures& figures
   });
 }
 
-/// Whether there is a pose to command. If not, no numbers are written: a program could take them
-/// for a command.
+/// True if there is a pose to command. Otherwise no numbers are written, since a program could take
+/// them for a command.
 bool has_command(const exchange::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain" || target.status == "lead_in";
 }
@@ -180,8 +180,8 @@ std::vector<std::string> correction_columns(const Corrections& corrections) {
   return columns;
 }
 
-/// The names of the file's columns where `ours` stand behind them: none is named twice, whatever
-/// the case.
+/// The names of the file's columns when the columns `ours` follow them. No name occurs twice,
+/// whatever the case.
 std::vector<std::string> kept_columns(const std::vector<std::string>& columns,
                                       const std::vector<std::string>& ours) {
   std::set<std::string> taken;

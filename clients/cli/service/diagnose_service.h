@@ -12,7 +12,7 @@ namespace trammel::cli {
 /// The arguments of `trammel diagnose`.
 struct DiagnoseArguments {
   std::string cell, report, next_poses, json, model, cell_out, since;
-  std::vector<std::string> batches;  ///< at a service one at most
+  std::vector<std::string> batches;  ///< at most one for a service
   std::uint64_t seed = 1;
   bool apply = false, strict = false, prove = false;
   double prove_minutes = 10;
@@ -22,21 +22,20 @@ struct DiagnoseArguments {
 /// Text for people, left out where a result goes to standard output.
 void say(const std::string& text, const DiagnoseArguments& arguments);
 
-/// Page, next poses and JSON, where they are asked for.
+/// Page, next poses and JSON, as far as they are requested.
 [[nodiscard]] Outputs outputs_of(const DiagnoseArguments& arguments);
-/// Writes the findings, with everything else that was put into `outputs`; says why there are no
-/// next poses where there are none.
+/// Writes the findings and the other `outputs`; explains missing next poses.
 [[nodiscard]] Status write_diagnosis(const nlohmann::ordered_json& json, std::string page,
                                      Outputs& outputs, const DiagnoseArguments& arguments);
 
-/// True if --strict asks for a model that lacks nothing and this one lacks something, which it says
-/// on standard error.
+/// True if --strict requires a complete model and this one lacks a cause, which it reports on
+/// standard error.
 [[nodiscard]] bool leaves_open(const nlohmann::ordered_json& json,
                                const DiagnoseArguments& arguments);
 
-/// Has a service diagnose one of its batches (`batches` names it; none: the newest) or a file,
-/// waits, and writes what it found. False where the result was to be put in force and was not, or
-/// leaves_open().
+/// Makes a service diagnose one of its batches (`batches` names it; none: the newest) or a file,
+/// waits, and writes the findings. Returns false if the result should have gone in force and did
+/// not, or if it leaves_open().
 [[nodiscard]] Result<bool> diagnose_at_service(const DiagnoseArguments& arguments);
 
 }  // namespace trammel::cli

@@ -5,8 +5,8 @@
 
 namespace trammel::cli {
 
-/// The play and hysteresis that a model knows; no approach point is needed by targets that
-/// are within `tolerance_mm`, 0: the cell's, with 95 %. Refuses where neither says a tolerance.
+/// The play and hysteresis that a model knows. Targets within `tolerance_mm` (0: the cell's
+/// tolerance) with 95 % need no approach point. Refuses if neither states a tolerance.
 [[nodiscard]] Result<cam::LeadInOptions> lead_in_options(const CompensatedModel& model,
                                                          double tolerance_mm);
 

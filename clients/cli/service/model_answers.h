@@ -9,7 +9,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/model_file.h"
 
-/// The answers that programs need of a model, whether it is a file or behind a service.
+/// A model's answers for programs, from a file or from a service.
 namespace trammel::cli {
 
 [[nodiscard]] cam::CellTools tools_of(const CompensatedModel& model);
@@ -18,23 +18,22 @@ namespace trammel::cli {
 struct ToolAndPayload {
   std::string tool, payload;
 };
-/// Those that a program asks for, by the cell's names; empty: its only ones. Refuses what the model
-/// was not trained with.
+/// The tool and payload of a program, by the cell's names; empty: its only ones. Refuses those that
+/// the model was not trained with.
 [[nodiscard]] Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model,
                                                             const std::string& tool,
                                                             const std::string& payload);
 
-/// The model of a file or, with --service and where no file is called so, the service's: of
-/// `cell@version`, or of a cell the one in force.
+/// The model of a file. With --service, if no file has that name, it is the service's model: of
+/// `cell@version`, or the model in force of a cell.
 [[nodiscard]] Result<CompensatedModel> model_named(const std::string& name,
                                                    const ServiceOptions& service);
 
 /// Tells which model answered a call.
 using SawModel = std::function<void(const exchange::ModelInfo&)>;
 
-/// Calls `work(session, context, model, saw)` with the model that the service answers with: it is
-/// fetched, and fetched again if another one has answered meanwhile. kBusy: that happened again and
-/// again.
+/// Calls `work(session, context, model, saw)` with the model that the service uses. The model is
+/// fetched, and fetched again if another one answered meanwhile. kBusy: this happened repeatedly.
 template <typename T, typename Work>
 [[nodiscard]] Result<T> with_served_model(const std::string& name, const ServiceOptions& service,
                                           const Work& work) {

@@ -106,7 +106,7 @@ void add_calibrated(const std::string& level, const CompensatedModel& model, con
                         .figures = figures_of(error.residual_B.transpose())});
 }
 
-/// The error left where the bias is applied at every pose, in domain or not. 3 x N, m.
+/// The remaining error if the bias is applied at every pose, inside the domain or not. 3 x N, m.
 Eigen::Matrix3Xd left_by_bias(const CompensatedModel& model, const MeasurementBatch& batch) {
   const BiasProblem error = leftover(model.parts().physics, batch);
   if (!model.bias()) return error.residual_B.transpose();  // none helped
@@ -129,7 +129,7 @@ void add_learned(const std::string& level, const CompensatedModel& model, const 
                         .bias_left_out = !model.bias()});
 }
 
-/// Truth beside what `model` says of the same parameters.
+/// Adds the true parameters beside those of `model`.
 void add_parameters(const std::string& level, const CompensatedModel& model, Study& study) {
   for (const IdentifiedParameter& identified : model.parts().parameters) {
     const auto known =
@@ -184,7 +184,7 @@ Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& stud
   return {};
 }
 
-/// Runs the study of how the learned bias converges with the poses it learns from.
+/// Runs the study of the learned bias' convergence with the number of training poses.
 Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>& levels,
                           Study& study) {
   const RangesDeg& ranges = kBiasStudies.back().ranges;
@@ -205,7 +205,7 @@ Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>
   return {};
 }
 
-/// Runs the study of how the complete physical model converges with the poses of identification.
+/// Runs the study of the complete physical model's convergence with the number of poses.
 Status run_calibration_sizes(Laboratory& laboratory, const std::string& level, Study& study) {
   const auto validation = TRY(laboratory.measure(kCalibrationRanges, kValidationPoses,
                                                  kFullRangeValidationDraw, "validation"));
@@ -314,8 +314,8 @@ Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal,
   return {};
 }
 
-/// Drills where the model's corrections say. `measured`: the same holes as they were measured
-/// uncorrected.
+/// Drills at the model's corrected places. `measured`: the same holes as measured without
+/// correction.
 void drill(const VirtualRobot& robot, const std::string& name, const CompensatedModel& model,
            const std::vector<TargetRow>& holes, const MeasurementBatch& measured, Study& study) {
   const Pose X_BW = robot.truth.X_WB.inverse();
@@ -329,7 +329,7 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
               correction.X_BT_wanted.translation())
           .norm();
     };
-    // One that is left alone is drilled where it is drilled uncorrected.
+    // A hole that is left alone is drilled at the uncorrected place.
     const JointVector uncorrected = context.q;
     const bool corrected = correction.status == CorrectionStatus::kOk ||
                            correction.status == CorrectionStatus::kOutOfDomain;

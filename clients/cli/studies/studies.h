@@ -27,15 +27,16 @@ struct StudyOptions {
 struct StudyRow {
   std::string set;         ///< `training`, `validation`, ...
   std::string model;       ///< `M0` ... `M3`, `M0+GP` ...
-  int training_poses = 0;  ///< that the last part of the model was identified or learned from
+  int training_poses = 0;  ///< poses from which the last part of the model was identified or
+                           ///< learned
   int poses = 0;           ///< in the set
   ErrorFigures figures;    ///< with the learned bias applied at every pose, as the source does
   std::optional<Evaluation> served =
       {};  ///< of a learned bias: as answers are given, with the calibrated model off domain
-  bool bias_left_out = false;  ///< `M3+GP` where none was worth it: the calibrated model as it is
+  bool bias_left_out = false;  ///< `M3+GP` if no bias was worth it: the unchanged calibrated model
 };
 
-/// A parameter of the virtual robot and what the levels take it for, in the parameter's unit.
+/// A parameter of the virtual robot and its values at each level, in the parameter's unit.
 struct StudyParameter {
   std::string name, unit;
   double truth = 0;
@@ -49,7 +50,7 @@ struct DrilledHole {
   CorrectionStatus status = CorrectionStatus::kRefused;
   double error_before = 0,
          error_after = 0;     ///< m, true distance from the wanted point, uncorrected and corrected
-  double expected_after = 0;  ///< m, what the model said of error_after
+  double expected_after = 0;  ///< m, the model's expectation of error_after
 };
 
 struct Study {
@@ -64,8 +65,8 @@ struct Study {
 /// As on the command line.
 [[nodiscard]] const std::vector<std::string>& study_names();
 
-/// Same robot, name and seed, same study. Refuses an unknown name, a robot that does not have six
-/// joints or cannot reach the ranges of the study, and holes that it does not reach.
+/// The same robot, name and seed give the same study. Refuses an unknown name, a robot that does
+/// not have six joints or cannot reach the ranges of the study, and holes out of reach.
 [[nodiscard]] Result<Study> run_study(const std::string& name, const VirtualRobot& robot,
                                       const StudyOptions& options);
 

@@ -5,8 +5,7 @@
 #include <string_view>
 #include <utility>
 
-/// Tables of the source's studies (chapters 5 and 7), and the values that are aimed at. Units as
-/// printed.
+/// Tables of the source's studies (chapters 5 and 7), and the values to reach. Units as printed.
 namespace trammel::cli {
 
 using RangesDeg = std::array<std::pair<double, double>, 6>;
@@ -35,8 +34,8 @@ struct PrintedFigures {
   std::array<double, 3> mean_mm, stddev_mm;
   double rms_mm, max_mm;
 };
-/// `study` as on the command line; `set` and `model` as StudyRow names them. Empty: the source
-/// prints nothing of it.
+/// `study` as on the command line; `set` and `model` as in StudyRow. Empty: the source prints no
+/// figures.
 [[nodiscard]] std::optional<PrintedFigures> printed_figures(std::string_view study,
                                                             std::string_view set,
                                                             std::string_view model);
@@ -49,9 +48,9 @@ struct Aim {
 [[nodiscard]] std::optional<Aim> aim_of(std::string_view study, std::string_view set,
                                         std::string_view model, int training_poses);
 
-/// Table 5.5 in mm and rad: what M1, M2 and M3 identify. Empty where it prints nothing; its
-/// compliances are left out, because the rows are shifted against the true values that the same
-/// table gives.
+/// Table 5.5 in mm and rad: the parameters identified by M1, M2 and M3. Empty where it prints none.
+/// Its compliances are left out, because the rows are shifted against the true values in the same
+/// table.
 [[nodiscard]] std::optional<double> printed_parameter(std::string_view parameter,
                                                       std::string_view model);
 

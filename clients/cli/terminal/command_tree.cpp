@@ -12,9 +12,9 @@ namespace trammel::cli {
 
 namespace {
 
-constexpr std::size_t kNameColumn = 26;  // width of what stands left of descriptions
+constexpr std::size_t kNameColumn = 26;  // width of the column left of descriptions
 
-/// `FLOAT:FLOAT in [0 - 0.9]` -> `FLOAT`, and what follows the colon.
+/// `FLOAT:FLOAT in [0 - 0.9]` split into `FLOAT` and the text behind the colon.
 struct TypeText {
   std::string name, range;
 };

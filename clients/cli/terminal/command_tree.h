@@ -7,17 +7,17 @@ namespace CLI {
 class App;
 }
 
-/// The commands and options of the parser as plain text: what help, manual pages and shell
-/// completions are made of.
+/// The commands and options of the parser as plain text, the source of help, manual pages and shell
+/// completions.
 namespace trammel::cli {
 
 struct OptionText {
-  std::vector<std::string> names;  ///< `-o`, `--output`; of a positional argument its one name
+  std::vector<std::string> names;  ///< `-o`, `--output`; for a positional argument its only name
   std::string value;               ///< `FILE`, `FLOAT`; empty: a flag
   std::string description;         ///< with range, default, and what it needs or excludes
   std::string group;               ///< its heading
   std::vector<std::string> words;  ///< the only values that it takes; empty: any
-  std::string place;  ///< what a bare word that stands for it is called; empty: none does
+  std::string place;  ///< the name for a bare word in its place; empty: no bare word stands for it
   bool required = false, positional = false, repeated = false;
 
   /// `-o, --output FILE`; `CELL or --cell TEXT`.
@@ -35,7 +35,7 @@ struct CommandText {
 
 [[nodiscard]] CommandText described(const CLI::App& app);
 
-/// The number of columns that a text takes: bytes that continue a character count nothing.
+/// The number of columns that a text takes. Bytes that continue a character do not count.
 [[nodiscard]] std::size_t columns_of(const std::string& text);
 
 /// Lines of at most `width` columns, broken between words only; those after the first are indented

@@ -16,9 +16,9 @@ namespace trammel::cli {
 /// empty where there is none.
 [[nodiscard]] std::string defaults_path();
 
-/// `words` (without the program's name) by option, with the options of the defaults file behind
-/// them, each where the command has it and `words` do not say it. Refuses (kUsage) a file that
-/// cannot be read, a line that is no `name = value`, and a name that is none of host,
+/// `words` (without the program's name) by option, followed by the options of the defaults file. An
+/// option is added if the command has it and `words` does not contain it. Refuses (kUsage) a file
+/// that cannot be read, a line that is no `name = value`, and a name that is none of host,
 /// discovery-server, port, security, domain, timeout, cell, tool, payload, seed.
 [[nodiscard]] Result<std::vector<std::string>> with_defaults(const CLI::App& app,
                                                              std::vector<std::string> words,

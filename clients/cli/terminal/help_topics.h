@@ -16,7 +16,7 @@ struct HelpTopic {
 
 [[nodiscard]] std::span<const HelpTopic> help_topics();
 
-/// The ten commands of every day in groups, for who types `trammel` alone.
+/// The ten everyday commands in groups, for a user who types `trammel` alone.
 [[nodiscard]] std::string_view overview();
 
 /// Command lines that work, one a line, for the end of a command's help; empty for a command that

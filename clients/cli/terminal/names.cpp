@@ -17,7 +17,8 @@ const Place kCell = {"--cell", "CELL"}, kModel = {"--model", "MODEL"},
             kVersion = {"--model", "CELL@VERSION"}, kBatch = {"--batch", "BATCH"},
             kJob = {"--job", "JOB"};
 
-/// The places of each command. Bare words that are left over are the command's own arguments.
+/// The options for bare words in each command. Remaining bare words are the command's own
+/// arguments.
 const std::map<std::string, std::vector<Place>> kPlaces = {{"activate", {kVersion}},
                                                            {"audit", {kCell}},
                                                            {"batches", {kCell, kBatch}},
@@ -52,10 +53,10 @@ bool is_bare(const std::string& word) {
   return word.size() < 2 || word[0] != '-' || (word[1] >= '0' && word[1] <= '9') || word[1] == '.';
 }
 
-/// A command line's words taken apart.
+/// The parts of a command line.
 struct Taken {
   std::set<const CLI::Option*> said;
-  std::vector<std::size_t> bare;  ///< where they stand
+  std::vector<std::size_t> bare;  ///< their places
 };
 
 Taken taken_apart(const CLI::App& command, const std::vector<std::string>& words) {
@@ -85,7 +86,7 @@ bool may_repeat(const CLI::Option& option) {
   return option.get_expected_max() == CLI::detail::expected_max_vector_size;
 }
 
-/// The bare words that the parser needs for arguments of the command's own.
+/// The number of bare words that the parser needs for the command's own arguments.
 std::size_t own_words(const CLI::App& command) {
   std::size_t count = 0;
   for (const CLI::Option* option : command.get_options())
@@ -93,7 +94,7 @@ std::size_t own_words(const CLI::App& command) {
   return count;
 }
 
-/// The options that bare words stand for, in their order; the last one may stand for several.
+/// The options for which bare words may stand, in their order. The last one may take several words.
 std::vector<const CLI::Option*> free_places(const CLI::App& command, const Taken& taken,
                                             bool cell_is_known) {
   std::vector<const CLI::Option*> free;
@@ -110,7 +111,7 @@ std::vector<const CLI::Option*> free_places(const CLI::App& command, const Taken
   return free;
 }
 
-/// True where bare words are all the command's own: `correct --undo` needs no model.
+/// True if all bare words are the command's own arguments: `correct --undo` needs no model.
 bool needs_no_name(const CLI::App& command, const Taken& taken) {
   const CLI::Option* undo = command.get_option_no_throw("--undo");
   return (undo != nullptr && taken.said.contains(undo)) || taken.bare.size() <= own_words(command);
@@ -123,8 +124,8 @@ const CLI::App* command_of_words(const CLI::App& app, const std::vector<std::str
   return found.empty() ? nullptr : found.front();
 }
 
-/// True where a word behind an option that names models, or an own argument of `compare`, is a
-/// version: the command asks a service for it.
+/// True if the word behind an option for models, or an own argument of `compare`, is a version. The
+/// command then asks a service.
 bool asks_for_version(const CLI::App& command, const std::vector<std::string>& words) {
   if (command.get_option_no_throw("--service") == nullptr) return false;
   for (std::size_t k = 1; k < words.size(); ++k) {

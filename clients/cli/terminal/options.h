@@ -19,13 +19,14 @@ class Validator;
 /// Options that several commands have.
 namespace trammel::cli {
 
-/// The options that say whether to ask a service, and which.
+/// The options that choose between files and a service, and select the service.
 struct ServiceOptions {
   bool service = false;
   std::vector<std::string> hosts = {
       "127.0.0.1"};  ///< names or addresses, each with a port behind it or not
   std::vector<std::string> discovery_servers;  ///< likewise
-  bool hosts_said = false;  ///< else only those count that discovery servers tell of, if any
+  bool hosts_said = false;  ///< false: if discovery servers are given, only hosts announced by them
+                            ///< count
   std::string security;     ///< folder of certificate and permissions; empty: none
   std::uint32_t domain = 0;
   std::vector<std::uint16_t> ports = {17500};
@@ -36,12 +37,12 @@ void add_service_options(CLI::App& command, ServiceOptions& options);
 /// The options of commands that only a service can carry out: `--service` may be said and changes
 /// nothing.
 void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
-/// Where servers are looked for: each host with its own port, or with every port; nowhere where
-/// only discovery servers were said. kUsage: a host that nobody knows.
+/// The places to search for servers: each host with its own port, or with every port; none if only
+/// discovery servers were given. kUsage: an unknown host.
 [[nodiscard]] Result<std::vector<HostPort>> places_of(const ServiceOptions& options);
 [[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
 
-/// Every option that takes a number, of the command and of those below it, refuses nan and inf.
+/// Makes every number option of the command and its subcommands refuse nan and inf.
 void need_finite_numbers(CLI::App& app);
 /// A number above 0.
 [[nodiscard]] CLI::Validator above_zero();
@@ -50,7 +51,7 @@ void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& 
 void add_json_option(CLI::App& command, std::string& path);
 /// `-o wide|json` of a command that prints a table; json goes to standard output, as `--json -`.
 void add_form_option(CLI::App& command, TableForm& form, std::string& json);
-/// Takes such a word; false: it is none.
+/// Takes such a word. Returns false for any other word.
 bool take_form(const std::string& word, TableForm& form, std::string& json);
 /// `--batch FILE`, again for each: every one is a measuring session.
 CLI::Option* add_batches_option(CLI::App& command, std::vector<std::string>& paths);

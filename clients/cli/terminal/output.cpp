@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 bool is_standard_output(const std::string& path) { return path == "-" || path == "/dev/stdout"; }
 
-/// True if writing one file would change the other. Devices do not count: nothing is read back from
-/// them.
+/// True if writing one file would change the other. Devices do not count, since their contents are
+/// not read back.
 bool same_file(const std::string& a, const std::string& b) {
   if (is_standard_output(a) || is_standard_output(b))
     return is_standard_output(a) && is_standard_output(b);
@@ -36,7 +36,7 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
-/// True where the stream is a terminal that shows colours, and the user has not said no to them.
+/// True if the stream is a terminal that shows colours, and the user has not refused them.
 bool shows_colours(int stream) {
   const char* terminal = std::getenv("TERM");
   const char* plain = std::getenv("NO_COLOR");
@@ -92,7 +92,7 @@ Status write_json(const std::string& path, const nlohmann::ordered_json& value) 
 }
 
 std::string json_text(const nlohmann::ordered_json& value) {
-  // Characters that JSON leaves alone may still control a terminal; its escapes are JSON's own.
+  // JSON leaves some characters alone that can control a terminal. JSON's own escapes replace them.
   return shown_lines(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) +
          "\n";
 }

@@ -13,7 +13,7 @@ namespace trammel::cli {
 /// Writes `text` whole or not at all; `-` is standard output.
 [[nodiscard]] Status write_output(const std::string& path, const std::string& text);
 
-/// Writes `value` where --json says; nothing when it was not given (empty path).
+/// Writes `value` to the path of --json; does nothing for an empty path.
 [[nodiscard]] Status write_json(const std::string& path, const nlohmann::ordered_json& value);
 
 /// The members of an error that are known, and the whole sentence.
@@ -25,9 +25,9 @@ void tell_refusal(const Error& error, const std::string& json_path);
 
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
 
-/// Text for people on standard output, control characters of foreign text spelled out, painted()
-/// where that is a terminal that shows colours and NO_COLOR is not set; left out when a result for
-/// programs goes there (`paths`: where results go).
+/// Text for people on standard output. Control characters of foreign text are spelled out. The text
+/// is painted() if the output is a terminal with colours and NO_COLOR is not set. It is left out
+/// when a result for programs goes to standard output (`paths`: where results go).
 void tell(const std::string& text, std::initializer_list<std::string> paths);
 
 /// A file that a command reads or writes, and the option that names it.
@@ -45,7 +45,7 @@ class Outputs {
   [[nodiscard]] Status check_apart(const std::vector<NamedFile>& inputs) const;
   /// Likewise, and as kRefused an output that cannot be written.
   [[nodiscard]] Status check(const std::vector<NamedFile>& inputs) const;
-  /// The text of an output that was added; one that gets none is not written.
+  /// The text of an added output; an output without text is not written.
   void put(const std::string& option, std::string text);
   [[nodiscard]] Status write() const;
 
@@ -65,19 +65,19 @@ struct OutputText {
 /// Writes all of them, or none.
 [[nodiscard]] Status write_together(const std::vector<OutputText>& texts);
 
-/// The text in bold red where standard error is a terminal that shows colours and NO_COLOR is not
-/// set; else as it is.
+/// The text in bold red if standard error is a terminal with colours and NO_COLOR is not set;
+/// otherwise unchanged.
 [[nodiscard]] std::string emphasised(const std::string& text);
 
-/// Lines for a terminal in colours: those that begin with a state are green, yellow or red by it.
+/// Lines for a terminal with colours. A line that begins with a state is green, yellow or red.
 [[nodiscard]] std::string painted(const std::string& lines);
 
 /// `, about 40 s left`, from how long a share of the work took; empty while that says little (under
 /// 2 s or 2 %) and at the end.
 [[nodiscard]] std::string time_left(double elapsed_s, double share);
 
-/// One line on standard error that is written over as work goes on, with the time that is left.
-/// Silent where standard error is no terminal.
+/// One line on standard error that is overwritten as work goes on, with the remaining time. Silent
+/// if standard error is not a terminal.
 class ProgressLine {
  public:
   ProgressLine();

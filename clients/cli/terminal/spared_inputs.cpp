@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// In the order in which two that are the same are named.
+/// The order in which two equal outputs are named.
 constexpr std::array<std::string_view, 12> kOutputs = {
     "--output", "--robot-output", "--report", "--receipt",  "--residuals", "--next-poses",
     "--rapid",  "--krl",          "--fanuc",  "--urscript", "--frames",    "--json"};
@@ -51,7 +51,7 @@ std::vector<NamedFile> outputs_of(const CLI::App& command) {
   return outputs;
 }
 
-/// The files that exist among what the other options were given.
+/// The existing files among the values of the other options.
 std::vector<NamedFile> inputs_of(const CLI::App& command) {
   std::vector<NamedFile> files;
   for (const CLI::Option* option : command.get_options()) {
@@ -89,7 +89,7 @@ std::string folder_of_program(const CLI::App& correct, const std::string& output
   return parent.empty() ? "." : parent;
 }
 
-/// The folder that the command makes where it is not there; empty: it makes none.
+/// The folder that the command makes if it is missing; empty: it makes none.
 std::string folder_that_is_made(const CLI::App& command) {
   const std::string name = command.get_name();
   if (name != "correct" && name != "manual" && name != "setup") return "";
@@ -97,8 +97,8 @@ std::string folder_that_is_made(const CLI::App& command) {
   return name == "correct" ? folder_of_program(command, output) : output;
 }
 
-/// That the folder may be written to, or can be made. What is a file is refused by whoever needs a
-/// folder.
+/// Checks that the folder is writable, or can be made. A file in its place is refused by the
+/// command that needs the folder.
 Status check_can_be_made(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error)) return {};
@@ -117,7 +117,7 @@ bool same_folder(const fs::path& a, const fs::path& b) {
   const auto place = [&](const fs::path& folder) {
     return fs::weakly_canonical(fs::absolute(folder / "a file", error), error);
   };
-  return place(a) == place(b);  // with a slash behind it or not
+  return place(a) == place(b);  // with or without a slash at the end
 }
 
 /// True if the output is, or lies in, a folder that the command makes.

@@ -12,8 +12,8 @@ struct TableColumn {
   bool is_wide = false;   ///< shown with `-o wide` alone
 };
 
-/// `table`: at most 100 columns of text, and the last column is wrapped. `wide`: everything, a line
-/// a row.
+/// `table`: at most 100 columns of text, with the last column wrapped. `wide`: everything, one line
+/// per row.
 enum class TableForm { kTable, kWide };
 
 /// Rows under their headings, each column as wide as it needs. Every row has a cell for each

@@ -53,7 +53,7 @@ std::string question(const std::string& prefix, const std::string& meant) {
   return meant.empty() ? "" : ", did you mean " + prefix + meant + "?";
 }
 
-/// Words of other programs, and what does that here.
+/// Words of other programs, and their equivalents here.
 struct OtherWord {
   std::string_view word, here;
 };
@@ -162,8 +162,8 @@ bool is_option(const std::string& word) {
   return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
 }
 
-/// The kind of file that each option takes, by its ending, and the keys that stand at the top of
-/// this kind alone.
+/// The kind of file that each option takes, by its ending, and the top-level keys that only this
+/// kind has.
 struct FileKind {
   const char* option;  ///< nullptr: none takes it
   std::array<const char*, 4> endings;
@@ -181,7 +181,7 @@ constexpr std::array kKinds = {
     FileKind{nullptr, {}, "a server file (YAML)", {"cells", "store"}},
 };
 
-/// The kind of file that the option takes; null where the table does not have it.
+/// The kind of file that the option takes. Null if the table does not list the option.
 const FileKind* kind_taken_by(const CLI::Option& option) {
   const auto found = std::find_if(kKinds.begin(), kKinds.end(), [&](const FileKind& kind) {
     return kind.option != nullptr && option.check_name(kind.option);
@@ -203,7 +203,7 @@ bool takes(const FileKind& kind, const std::string& ending) {
                      [&](const char* one) { return one != nullptr && ending == one; });
 }
 
-/// The option that named the file; nothing where none did.
+/// The option that named the file; null if none did.
 const CLI::Option* named_by(const CLI::App& command, const std::string& file) {
   for (const CLI::Option* option : command.get_options()) {
     const auto& said = option->results();
@@ -244,8 +244,7 @@ std::string of_missing_file(const std::string& file, const CLI::App& command) {
                      fs::current_path(error).string());
 }
 
-/// The kind of file that the option takes, where `file` has the ending of another kind; else
-/// empty.
+/// The kind of file that the option takes, if `file` has the ending of another kind; else empty.
 std::string of_wrong_kind(const std::string& file, const CLI::Option& option) {
   std::error_code ignored;
   const std::string ending = fs::path(file).extension().string();
@@ -259,8 +258,7 @@ std::string of_wrong_kind(const std::string& file, const CLI::Option& option) {
                      right->option);
 }
 
-/// The kind of file that the option takes, where the wrong keys are those of one other kind;
-/// else empty.
+/// The kind of file that the option takes, if all wrong keys belong to one other kind; else empty.
 std::string of_other_keys(const Error& error, const CLI::Option& option) {
   const FileKind* taken = kind_taken_by(option);
   std::set<const FileKind*> kinds;
@@ -341,7 +339,7 @@ bool is_number(const std::string& word) {
   return !word.empty() && end == word.c_str() + word.size();
 }
 
-/// Says what is wrong with a word where `option` takes a number; empty where it is one.
+/// The fault of a word where `option` takes a number; empty if it is one.
 std::string no_number(const CLI::App& app, const std::string& command, const std::string& option,
                       const std::string& word) {
   const CLI::App* of = command_of(app, command);
@@ -368,7 +366,7 @@ std::string word_in(const std::string& what, bool unconverted) {
   return equals == std::string::npos ? "" : what.substr(equals + 3);
 }
 
-/// How the command is written, where something that it needs was left out; else empty.
+/// The syntax of the command if a required part is missing; else empty.
 std::string form_of_command(const CLI::App& app, const CLI::ParseError& error,
                             const std::string& command) {
   const CLI::App* of = command_of(app, command);
@@ -379,7 +377,7 @@ std::string form_of_command(const CLI::App& app, const CLI::ParseError& error,
 }  // namespace
 
 Error usage_error(const CLI::App& app, const CLI::ParseError& error, const std::string& command) {
-  // The parser tells the option in its sentence alone: `Could not convert: --seed = x`, `--cell is
+  // Only the parser's sentence contains the option: `Could not convert: --seed = x`, `--cell is
   // required`.
   std::string what = error.what();
   const std::size_t behind = what.find(": ");

@@ -139,7 +139,7 @@ std::string figures_table(const ordered_json& diagnosis) {
 std::string unexplained_text(const ordered_json& unexplained) {
   if (!unexplained.at("present").get<bool>()) return "";
   const auto on = unexplained.at("depends_on").get<std::vector<std::string>>();
-  // A p-value is of what was tested: where nothing was found to depend on, it is that of the noise.
+  // The p-value of the test: without a dependence it is that of the noise.
   const std::string p = fmt::format(" (p {})", p_text(unexplained.at("p_value")));
   return fmt::format("\nUnexplained: {} rms{}. {}\n", micrometres(unexplained.at("rms_mm")),
                      on.empty() ? ", more than the stated noise" + p : "",
@@ -162,7 +162,7 @@ struct Saying {
   std::string what, of;
 };
 
-/// Says the same once: `of` is added to what is said already, after `between`.
+/// Merges equal sentences: `of` is added to the subjects of an existing one, after `between`.
 void say(std::vector<Saying>& sayings, const std::string& what, const std::string& of,
          const char* between) {
   const auto known = std::find_if(sayings.begin(), sayings.end(),
@@ -174,8 +174,8 @@ void say(std::vector<Saying>& sayings, const std::string& what, const std::strin
   }
 }
 
-/// Causes that this batch could not have shown, or not for certain, and what they need; a line for
-/// all joints alike.
+/// Causes that this batch could not have shown, or not for certain, and the data that they need;
+/// one line for all joints alike.
 std::string unseen_lines(const ordered_json& unseen) {
   std::vector<Saying> sayings;
   for (const ordered_json& one : unseen) {
@@ -197,7 +197,7 @@ std::string unseen_lines(const ordered_json& unseen) {
   return text;
 }
 
-/// Says what a cause would need to show; empty where nothing is said.
+/// The data that a cause needs to show; empty if none are stated.
 std::string need_of(const ordered_json& unseen, const std::string& name) {
   for (const ordered_json& one : unseen) {
     const std::string joint =
@@ -207,7 +207,7 @@ std::string need_of(const ordered_json& unseen, const std::string& name) {
   return "";
 }
 
-/// True if nothing at all of the cause shows, which is said elsewhere.
+/// True if the cause shows no effect at all. Another part of the text says so.
 bool is_never_shown(const ordered_json& unseen, const std::string& name) {
   return std::any_of(unseen.begin(), unseen.end(), [&](const ordered_json& one) {
     const std::string joint =
@@ -216,7 +216,7 @@ bool is_never_shown(const ordered_json& unseen, const std::string& name) {
   });
 }
 
-/// A line a cause: all that looks like it, and what it needs.
+/// A line per cause: its imitators, and the data that it needs.
 std::string not_separable_lines(const ordered_json& diagnosis) {
   std::vector<Saying> sayings;
   for (const ordered_json& group : diagnosis.at("not_separable")) {
@@ -246,7 +246,7 @@ std::string limits_text(const ordered_json& diagnosis) {
              : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
 }
 
-/// The size that a cause is named from, with its interval; or how far it is known.
+/// The size from which a cause is named, with its interval; or the bounds that are known.
 std::string proved_size(const ordered_json& cause) {
   const ordered_json& sizes = cause.at("sizes");
   if (sizes.empty()) return "not tried";
@@ -312,7 +312,7 @@ std::string next_poses_text(const ordered_json& diagnosis) {
   return text;
 }
 
-/// The residual of a pose as one length: it stands beside the other errors.
+/// The residual of a pose as one length, comparable with the other errors.
 std::string noise_line(const ordered_json& diagnosis) {
   const double noise = diagnosis.at("noise_mm"), root = std::sqrt(3.0);
   return fmt::format(
@@ -326,7 +326,7 @@ std::string extended_line(const char* name, const CompensatedModel& model) {
   return figures_line(name, figures_json(model.parts().validation->compensated));
 }
 
-/// Where the error of the drawing comes from.
+/// The origin of the drawing's error.
 std::string budget_text(const ordered_json& budget) {
   if (budget.is_null()) return "";
   std::string text;

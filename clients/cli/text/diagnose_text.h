@@ -8,8 +8,8 @@
 /// A diagnosis told to a metrologist.
 namespace trammel::cli {
 
-/// From what `diagnose --json` writes, whoever made it: the verdict, the findings, what could not
-/// be told, where to measure next.
+/// The text for the output of `diagnose --json`, from any source: the verdict, the findings, the
+/// open questions, the next poses to measure.
 [[nodiscard]] std::string diagnosis_text(const nlohmann::ordered_json& diagnosis);
 
 /// The poses suggested next, as a plan: `pose_id`, joints in deg (rails mm).

@@ -52,9 +52,10 @@ std::string orientation_lines(const std::optional<OrientationFigures>& orientati
   return text + "\n";
 }
 
-/// Where it is the share of no model that is as good as its instrument.
+/// The line for a coverage that differs from that of a model as good as its instrument.
 std::string stated_coverage_line(std::optional<double> share) {
-  constexpr double kFar = 0.5;  // a model that leaves as much again as the instrument has 0.83
+  constexpr double kFar = 0.5;  // a model with 1.5 times the instrument's error has a coverage of
+                                // 0.83
   if (!share || *share >= kFar) return "";
   return fmt::format("  {:.1f} % are inside the 95 % interval of the stated sigma alone\n",
                      100 * *share);
@@ -140,7 +141,7 @@ std::string residuals_csv(const MeasurementBatch& batch,
 
 std::string gauge_residuals_csv(const MeasurementBatch& batch,
                                 const CompensatedModel::GaugeErrors& errors) {
-  constexpr double kSuspect = 4.89;  // of one number, that 1 in 10^6 good ones exceeds
+  constexpr double kSuspect = 4.89;  // of one number, exceeded by 1 in 10^6 good ones
   std::string text =
       "pose_id,row,anchor_id,value_mm,error_mm,s_mm,z,calibrated_mm,nominal_mm,in_domain,suspect\n";
   const auto rounded = [](double value) { return fmt::format("{:.6g}", value); };
@@ -327,7 +328,7 @@ std::string suspects_text(const std::vector<SuspectPose>& suspects) {
   return text;
 }
 
-/// Where the millimetres come from.
+/// The error budget.
 std::string budget_text(const ModelParts& parts) {
   if (!parts.budget) return "";
   std::string text;
@@ -352,7 +353,7 @@ std::string model_text(const CompensatedModel& model) {
 
 namespace {
 
-/// Two correlated parameters are told from here on.
+/// From this correlation on the text names two parameters as correlated.
 constexpr double kWorthTelling = 0.9;
 
 /// Pairs of parameters whose estimates are correlated.
@@ -474,7 +475,7 @@ ordered_json model_json(const CompensatedModel& model) {
   if (!parts.sessions.empty())
     json["between_sessions"] = session_changes_json(session_changes(model));
   if (!parts.sessions.empty())
-    json["changes"] = json["between_sessions"];  // as it was called before
+    json["changes"] = json["between_sessions"];  // the former name of this member
   if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;

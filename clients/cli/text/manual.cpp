@@ -19,7 +19,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text;
 }
 
-/// Text for troff: no line of it is a request, hyphens are those of options.
+/// Escapes text for troff: no line becomes a request, and the hyphens are those of options.
 std::string troff(const std::string& text) {
   std::string safe = replaced(replaced(text, "\\", "\\e"), "-", "\\-");
   if (safe.starts_with('.') || safe.starts_with('\'')) safe = "\\&" + safe;

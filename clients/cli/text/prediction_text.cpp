@@ -36,7 +36,7 @@ double error_mm(const PredictedTarget& target) {
   return std::hypot(e[0], e[1], e[2]);
 }
 
-/// rms of the error to expect: its mean and what is not known of it.
+/// rms of the expected error: from its mean and its standard deviation.
 double expected_mm(const PredictedTarget& target) {
   const auto& s = target.predicted.true_stddev_mm;
   return std::hypot(error_mm(target), std::hypot(s[0], s[1], s[2]));

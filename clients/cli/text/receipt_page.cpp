@@ -129,7 +129,7 @@ ordered_json points(const CorrectedProgram& program) {
   std::stable_sort(path.begin(), path.end(),
                    [](const ReceiptRow* a, const ReceiptRow* b) { return a->order < b->order; });
   ordered_json all = ordered_json::array();
-  // A long program shows the targets that went wrong, and so many others that its path still reads.
+  // A long program shows the bad targets, and enough others to make its path readable.
   const std::size_t step = path.size() / kMostPoints + 1;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const ReceiptRow& row = *path[i];

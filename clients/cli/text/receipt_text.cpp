@@ -23,8 +23,8 @@ using cam::ReceiptRow;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kNumbers = 7;  // of the longest kind of target
-// Bytes a target: a text of a long program that grows by doubling takes three times its size for a
-// moment.
+// Bytes per target. The text of a long program that grows by doubling takes three times its size
+// for a moment.
 constexpr std::size_t kCsvBytes = 400;
 constexpr std::size_t kJsonBytes = 900;
 
@@ -36,7 +36,7 @@ void add_number(std::string& text, double value, std::chars_format format, int d
               std::to_chars(written.begin(), written.end(), value, format, digits).ptr);
 }
 
-/// Nothing where it is not known.
+/// Adds a number; an unknown one stays empty.
 void add_fixed(std::string& text, double value, int decimals) {
   if (std::isfinite(value)) add_number(text, value, std::chars_format::fixed, decimals);
   text += ',';
@@ -135,7 +135,8 @@ std::string receipt_csv(const CorrectedProgram& program) {
     add_numbers(text, row.before);
     add_numbers(text, row.after);
     for (Eigen::Index k = 0; k < 3; ++k) add_fixed(text, to_mm(row.p_B(k)), 4);
-    // Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
+    // Micrometres appear in mm with four decimals, tenths of them with five. Nobody knows more
+    // digits.
     for (const double value : {row.error_before_mm, row.error_after_mm, row.sigma_mm,
                                row.sigma_measured_mm, row.rounding_mm})
       add_fixed(text, value, 5);
@@ -169,7 +170,7 @@ std::string receipt_json(const CorrectedProgram& program,
                          {"line", program.largest_step_line}}},
                        {"inserted_lines", inserted}};
   if (verdict) head["tolerance"] = tolerance_json(*verdict);
-  // A line a target: all of them at once as a JSON value would take hundreds of megabytes of a long
+  // A line per target: as one JSON value, all of them would take hundreds of megabytes for a long
   // program.
   std::string text = json_text(head);
   text.erase(text.rfind("\n}"));
@@ -211,7 +212,7 @@ std::string receipt_summary(const CorrectedProgram& program) {
 
 namespace {
 
-/// Rows that are left for one reason.
+/// Rows that are left alone for one reason.
 struct Reason {
   const ReceiptRow* first = nullptr;
   std::size_t targets = 0, motions = 0;

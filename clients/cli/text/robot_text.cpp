@@ -55,7 +55,7 @@ Pose turned(int axis, double angle) {
   return make_pose(rotation_exp(angle * Vector3::Unit(axis)), Vector3::Zero());
 }
 
-/// Up to the joint's axis, and from it to the end of the link.
+/// The transforms to the joint's axis, and from there to the end of the link.
 Pose before_axis(const LinkGeometry& link) {
   Pose X = turned(2, link.theta);
   X.translation() = Vector3(0, 0, link.d);
@@ -94,7 +94,7 @@ std::string axis_joints(const Chain& chain, int j, const std::string& parent, co
   for (std::size_t k = 0; k < followed.size(); ++k) {
     const Joint& leader = chain.joint(followed[k]);
     const double ratio = chain.transmission()(j, followed[k]);
-    Joint range;  // of what it adds
+    Joint range;  // of the joints that it adds
     range.lower = std::min(ratio * leader.lower, ratio * leader.upper);
     range.upper = std::max(ratio * leader.lower, ratio * leader.upper);
     const bool free = !std::isfinite(range.lower) || !std::isfinite(range.upper);
@@ -143,7 +143,7 @@ std::string row(const std::string& part, const std::string& parameter, const cha
                      nominal, calibrated, calibrated - nominal, u95);
 }
 
-/// The name, or with a number behind it where another tool has it.
+/// The name, with a number behind it if another tool has it.
 std::string unused(const std::string& name, std::set<std::string>& used) {
   std::string one = name;
   for (int n = 2; !used.insert(one).second; ++n) one = fmt::format("{}_{}", name, n);

@@ -10,8 +10,9 @@ namespace trammel::cli {
 
 /// URDF of links and joints alone: `world` (the tracker's W), `base_link` (calibrated), `joint_1`
 /// ..., `flange`, and a link `tool_NAME` for each tool; `controller_base` is the base as the
-/// controller believes it. Lengths in m, angles in rad, to 1e-15. A joint that follows another is a
-/// second one on the same axis that mimics it. What is left out stands in comments, in mm.
+/// controller believes it. Lengths in m, angles in rad, to 1e-15. A joint that follows another
+/// appears a second time on the same axis and mimics it. Omitted errors are listed in comments, in
+/// mm.
 [[nodiscard]] std::string urdf_text(const CompensatedModel& model, const RigidRobot& robot);
 /// A robot file (models/), with base and tools as a cell file has them in comments.
 [[nodiscard]] std::string robot_yaml_text(const CompensatedModel& model, const RigidRobot& robot);

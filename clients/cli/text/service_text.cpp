@@ -220,7 +220,7 @@ ordered_json server_json(const client::ServerStatus& server) {
 
 namespace {
 
-/// Members of what a server says, whose bytes come from outside.
+/// Members of a server's answer, whose bytes come from outside.
 std::string word_in(const ordered_json& object, const char* key) {
   const bool is_there = object.is_object() && object.contains(key) && object[key].is_string();
   return is_there ? object[key].get<std::string>() : std::string();
@@ -345,7 +345,7 @@ std::string state_of(const client::BatchOfService& batch) {
 
 std::string batches_text(const std::vector<client::BatchOfService>& batches, TableForm form) {
   if (batches.empty()) return "no batches\n";
-  // Each server says what it knows of a batch, which may differ.
+  // Each server states its own knowledge of a batch, and these may differ.
   const bool several = std::any_of(
       batches.begin(), batches.end(),
       [&](const client::BatchOfService& one) { return one.server != batches.front().server; });

@@ -13,13 +13,12 @@ namespace trammel::cli {
 
 [[nodiscard]] nlohmann::ordered_json job_json(const client::JobStatus& job);
 [[nodiscard]] nlohmann::ordered_json jobs_json(const std::vector<client::DatedJob>& jobs);
-/// A line a job: those that run and wait, of those that are done the last one of each cell, those
-/// that failed.
+/// A line per job: those that run and wait, the last done one of each cell, and those that failed.
 [[nodiscard]] std::string jobs_text(const std::vector<client::DatedJob>& jobs);
-/// A row each, with how those that are over ended.
+/// One row per job, with the outcome of those that have ended.
 [[nodiscard]] std::string all_jobs_text(const std::vector<client::DatedJob>& jobs,
                                         TableForm form = TableForm::kTable);
-/// A job that was begun, and the commands that show how it goes.
+/// A job that has begun, and the commands that show its progress.
 [[nodiscard]] std::string started_text(const std::string& cell, std::int64_t job);
 
 [[nodiscard]] nlohmann::ordered_json models_json(const std::vector<exchange::ModelInfo>& models);
@@ -33,11 +32,11 @@ namespace trammel::cli {
 /// (`reachable` false). `of_record`: as servers_text() takes them.
 void add_other_servers(const nlohmann::ordered_json& of_record, nlohmann::ordered_json& servers);
 
-/// The text of `record` as a server says it; empty where that is a file beside the server.
+/// The text of a server's `record`; empty if that is a file beside the server.
 [[nodiscard]] std::string record_text(const nlohmann::ordered_json& record);
 
-/// The servers of the record as one of them tells; null: it cannot say. Empty where the record is a
-/// file.
+/// The servers of the record, as one of them lists them; null: it cannot tell. Empty if the record
+/// is a file.
 [[nodiscard]] std::string servers_text(const nlohmann::ordered_json& servers,
                                        const nlohmann::ordered_json& record);
 
@@ -47,12 +46,13 @@ void add_other_servers(const nlohmann::ordered_json& of_record, nlohmann::ordere
 
 [[nodiscard]] nlohmann::ordered_json batches_json(
     const std::vector<client::BatchOfService>& batches);
-/// A row a batch, with the server that says it where there are several.
+/// One row per batch, with the server that states it if there are several.
 [[nodiscard]] std::string batches_text(const std::vector<client::BatchOfService>& batches,
                                        TableForm form = TableForm::kTable);
 
-/// A version that was put in force: before, after, limit, why, and what to do next, as far as the
-/// service says so. `said`: its `in_force` of the cell (READ_HEALTH), from outside; null: nothing.
+/// A version that was put in force: before, after, limit, reason and next step, as far as the
+/// service states them. `said`: the member `in_force` in the answer to READ_HEALTH, unchecked; null
+/// if there is none.
 [[nodiscard]] nlohmann::ordered_json in_force_json(const std::string& cell, int version,
                                                    const nlohmann::ordered_json& said);
 /// The text for people.

@@ -21,7 +21,7 @@ std::optional<PrintedFigures> row_printed(const Study& study, const StudyRow& ro
   return printed_figures(study.name, row.set, row.model);
 }
 
-/// `M3+none` where a bias was asked for and none was worth it.
+/// `M3+none` if a bias was requested and none was worth it.
 std::string shown_model(const StudyRow& row) {
   return row.bias_left_out ? row.model.substr(0, row.model.find('+')) + "+none" : row.model;
 }

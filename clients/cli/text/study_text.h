@@ -8,9 +8,9 @@
 /// A study, told to people and to programs.
 namespace trammel::cli {
 
-/// The source's figures, ours and what is aimed at, side by side; mm.
+/// The source's figures, ours and the aims, side by side; mm.
 [[nodiscard]] std::string study_text(const Study& study);
-/// All of it.
+/// The study with all its figures.
 [[nodiscard]] nlohmann::ordered_json study_json(const Study& study);
 
 }  // namespace trammel::cli

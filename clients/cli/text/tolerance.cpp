@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kSure = 0.95;
 
-/// Probability that |e| <= r for e with a mean of this length and this stddev of each axis.
+/// Probability that |e| <= r, for e with a mean of this length and this standard deviation of each
+/// axis.
 double inside(double r, double mean, double stddev) {
   if (stddev <= 0) return mean <= r ? 1 : 0;
   const double a = (r - mean) / stddev, b = (r + mean) / stddev;
@@ -26,7 +27,7 @@ double inside(double r, double mean, double stddev) {
                            stddev / (mean * std::sqrt(2 * kPi)) * tail);
 }
 
-/// The share of errors with this rms that lie inside the tolerance.
+/// The share of errors with this rms that are inside the tolerance.
 double share_inside(double tolerance, double rms, double sigma) {
   const double mean = std::sqrt(std::max(0.0, rms * rms - 3 * sigma * sigma));
   return inside(tolerance, mean, sigma);

@@ -25,24 +25,22 @@ struct ToleranceVerdict {
   std::size_t before = 0;                          ///< inside with 95 % or more, not corrected
   std::size_t after = 0;                           ///< likewise as they are now
   double expected_before = 0, expected_after = 0;  ///< mean number inside
-  std::size_t out_of_domain =
-      0;  ///< of those whose error is known: what is told of them is a guess
+  std::size_t out_of_domain = 0;  ///< of those with a known error: their stated error is a guess
 };
-/// True if a target is inside with 95 % or more, as it is when corrected. Not where its error is
-/// not known.
+/// True if a corrected target is inside with 95 % or more. False if its error is not known.
 [[nodiscard]] bool surely_inside(const ExpectedError& target, double tolerance_mm);
 [[nodiscard]] ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets,
                                                  double tolerance_mm);
 /// `tolerance 0.2 mm: 33 of 35 targets are inside with 95 % or more (before: 0); 34.1 are expected
 /// inside`
 [[nodiscard]] std::string verdict_text(const ToleranceVerdict& verdict);
-/// Conditions of `correct --strict` on targets, before it writes anything. `left_alone` says which
-/// targets would be left as they were, a line each behind its heading; empty: none. Refuses those,
-/// and with a tolerance each target that is not inside with 95 %, whose error is not known, or that
-/// is out of domain; says how many.
+/// Checks the conditions of `correct --strict` on targets, before it writes anything. `left_alone`
+/// lists the targets that would stay unchanged, a line each behind its heading; empty: none.
+/// Refuses these, and with a tolerance each target that is not inside with 95 %, has an unknown
+/// error, or is out of domain; states the number.
 [[nodiscard]] Status check_strictly(const std::string& left_alone,
                                     const std::optional<ToleranceVerdict>& verdict);
-/// `tolerance` of what `correct --json` writes.
+/// The member `tolerance` in the output of `correct --json`.
 [[nodiscard]] nlohmann::ordered_json tolerance_json(const ToleranceVerdict& verdict);
 
 }  // namespace trammel::cli

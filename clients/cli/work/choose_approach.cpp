@@ -13,8 +13,9 @@ namespace {
 
 constexpr double kWorthATurn = 0.9;  // of the sigma without
 
-/// Turns all the same way, step by step: each step begins at the joints of the one before. A target
-/// that is left as it stands is turned on until it is reached.
+/// Turns all targets in the same sense, step by step. Each step begins at the joints of the
+/// previous one. If a target cannot be reached in its own orientation, the turns continue until it
+/// is reached.
 Status turn_one_way(const cam::AskTargets& ask, const Chain& robot, int way,
                     const std::vector<exchange::AskedTarget>& as_asked,
                     std::vector<exchange::AskedTarget>& targets, Corrections& corrections) {
