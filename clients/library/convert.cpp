@@ -9,7 +9,8 @@ namespace trammel::library {
 
 namespace {
 
-constexpr double kUnitLength = 1e-3;   // how far a quaternion may be from length 1, as in files
+constexpr double kUnitLength = 1e-3;   // accepted difference of a quaternion's length from 1, as in
+                                       // files
 constexpr double kHottest = 1000;      // degrees Celsius, either side of zero
 constexpr double kFarthestMm = 1e6;    // of a position, as in files
 constexpr double kLargestJoint = 1e6;  // deg, of a rail mm
@@ -18,8 +19,8 @@ bool is_rail(const Chain& robot, int joint) {
   return robot.joint(joint).type == JointType::kPrismatic;
 }
 
-/// The code of the same name. One that is new in ours needs its line here: the compiler refuses a
-/// switch that lacks it.
+/// The code of the same name. A new code of ours needs a line here: the compiler rejects a switch
+/// without it.
 constexpr api::ErrorCode same_code(trammel::ErrorCode code) {
   using trammel::ErrorCode;
   switch (code) {

@@ -8,7 +8,7 @@
 #include "server/base/result.h"
 #include "server/robot/chain.h"
 
-/// Between what the library hands out (mm, deg) and SI.
+/// Conversions between the library's values (mm, deg) and SI.
 namespace trammel::library {
 
 [[nodiscard]] api::Error to_api(const Error& error);
@@ -20,7 +20,8 @@ template <typename T>
 
 [[nodiscard]] std::vector<api::Note> to_api(const std::vector<Note>& notes);
 
-/// Refuses numbers that are not finite and quaternions that are not of length 1 within 1e-3.
+/// Refuses numbers that are not finite and quaternions whose length differs from 1 by more than
+/// 1e-3.
 [[nodiscard]] Result<Pose> from_api(const api::Pose& X_AB);
 
 /// Refuses another number of joints than the robot has, and numbers that are not finite.
@@ -30,8 +31,8 @@ template <typename T>
 /// error is its index.
 [[nodiscard]] Result<std::vector<JointVector>> all_joints_from_api(
     std::span<const double> joints_deg, const Chain& robot);
-/// Refuses directions other than -1, 0 and 1, another number of them than joints, and a temperature
-/// that is none.
+/// Refuses directions other than -1, 0 and 1, a number of directions other than that of the joints,
+/// and an impossible temperature.
 [[nodiscard]] Status check_context(const api::Context& context, const Chain& robot);
 
 }  // namespace trammel::library

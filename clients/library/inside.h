@@ -23,7 +23,7 @@ struct Batch::Inside {
 
 struct Model::Inside {
   CompensatedModel model;
-  ToldByTraining told = {};  ///< of one that was trained here; a file keeps the model's own notes
+  ToldByTraining told = {};  ///< for a model trained here; a file only has the model's own notes
 };
 
 }  // namespace trammel::api

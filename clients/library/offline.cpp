@@ -43,7 +43,7 @@ using library::to_api;
 namespace {
 
 constexpr std::size_t kPosesTogether = 256;  // poses that a model predicts at once
-constexpr double kLargestShare = 0.9;        // of the rows that may be held out
+constexpr double kLargestShare = 0.9;        // largest share of rows to hold out
 
 trammel::Status check_share(double share) {
   if (share >= 0 && share <= kLargestShare) return {};
@@ -53,8 +53,8 @@ trammel::Status check_share(double share) {
       .beyond(share, kLargestShare);
 }
 
-/// Batches made ready for a cell, each a session of its own or as many as its column says. Two of
-/// one name get numbers.
+/// Batches made ready for a cell. Each is a session of its own, or has the sessions of its column.
+/// Two with one name get numbers.
 trammel::Result<CheckedBatch> checked(std::span<const Batch> batches, const trammel::Cell& cell,
                                       const HoldOut& hold_out) {
   if (batches.empty())
@@ -104,7 +104,7 @@ Evaluation evaluation_of(const trammel::Evaluation& e) {
   return out;
 }
 
-/// A target as the model takes it. Refuses what a file of targets would.
+/// A target in the model's form. Refuses the same as a file of targets.
 trammel::Result<trammel::Target> target_from(const Target& asked, const Context& context,
                                              const Chain& robot) {
   trammel::Target target;

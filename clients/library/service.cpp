@@ -20,7 +20,7 @@ struct Session::Inside {
   mutable Mutex mutex;
   mutable std::map<std::string, Chain> robots TRAMMEL_GUARDED_BY(mutex);
 
-  /// The robot of a cell, which its model says and no training changes: which joints are rails.
+  /// The robot of a cell: which joints are rails. The model says so, and no training changes it.
   [[nodiscard]] trammel::Result<Chain> robot_of(const std::string& cell) const {
     {
       const MutexLock lock(mutex);

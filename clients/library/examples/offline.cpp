@@ -1,4 +1,4 @@
-// Where does the robot of a model really go, and what must be commanded instead? offline MODEL
+// Shows the real place of a model's robot, and the command that would correct it: offline MODEL
 #include "trammel/offline.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Shows what a running service says of its cells: service PORT DOMAIN
+// Shows the cells of a running service: service PORT DOMAIN
 #include "trammel/service.h"
 
 #include <cstdio>

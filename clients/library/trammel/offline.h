@@ -27,7 +27,7 @@ class TRAMMEL_API Cell {
   [[nodiscard]] std::string robot() const;
   /// Number of joints n.
   [[nodiscard]] std::size_t joints() const;
-  /// Names of the joints in files, n of them: `q1_deg`, of a rail `q1_mm`.
+  /// Names of the joints in files, n of them: `q1_deg`, for a rail `q1_mm`.
   [[nodiscard]] std::vector<std::string> joint_columns() const;
   /// Ids of its tools.
   [[nodiscard]] std::vector<std::string> tools() const;
@@ -97,16 +97,16 @@ struct OrientationErrors {
 /// The three levels of one model on the same poses.
 struct Evaluation {
   int poses = 0;               ///< number of poses
-  int in_domain = 0;           ///< of them in domain
+  int in_domain = 0;           ///< the number of poses in domain
   double coverage_95 = 0;      ///< share of coordinates inside their 95 % interval
   Figures nominal;             ///< of the drawing
   Figures calibrated;          ///< with the error sources identified
   Figures compensated;         ///< with the learned bias
   std::optional<double> nlpd;  ///< mean negative log predictive density, nat, positions in mm
-  std::optional<OrientationErrors> orientation;  ///< where orientations were measured
-  std::string doubt_of_bias;  ///< where the bias does not help, a sentence; else empty
+  std::optional<OrientationErrors> orientation;  ///< if orientations were measured
+  std::string doubt_of_bias;  ///< a sentence if the bias does not help; else empty
   int trained_on =
-      0;  ///< of the poses, those that the model was trained on: they say how well it fits
+      0;  ///< the number of poses that the model was trained on: they only show how well it fits
   /// Share of coordinates inside the 95 % interval of the stated sigma alone: whether the model is
   /// as good as the instrument.
   std::optional<double> coverage_95_stated;
@@ -118,12 +118,12 @@ struct Parameter {
   std::string unit;         ///< of value and u95
   double value = 0;         ///< the correction to the drawing
   double u95 = 0;           ///< two standard uncertainties
-  bool identified = false;  ///< whether the poses say more of it than was known before
+  bool identified = false;  ///< true if the poses determine it better than the prior did
 };
 
-/// The training poses of a model: what it promises is about these.
+/// The training poses of a model: its stated accuracy applies to these.
 struct Measured {
-  std::string sentence;         ///< all of it in words; where it is not on record, that
+  std::string sentence;         ///< a summary in words; without a record it says so
   int poses = 0;                ///< 0: not on record, in models from before it was recorded
   std::vector<int> from_above;  ///< poses that each joint fell into
   std::vector<int> from_below;  ///< poses that each joint rose into
@@ -131,9 +131,9 @@ struct Measured {
   std::optional<double> temperature_max_c;  ///< likewise
   std::array<double, 3> lower_mm{};         ///< a corner of the box in B that the tool was in, mm
   std::array<double, 3> upper_mm{};         ///< the opposite corner, mm
-  double volume_m3 = 0;  ///< of the box, what is within reach of a place where the tool was
+  double volume_m3 = 0;            ///< of the box, the part within reach of a measured tool place
   std::optional<double> reach_mm;  ///< mm: a pose farther from all measured places is out of domain
-  std::string instrument;          ///< as the cell file names it, with its stated sigma
+  std::string instrument;          ///< its name in the cell file, with its stated sigma
 };
 
 /// Nominal chain, identified error sources and learned bias.
@@ -162,20 +162,20 @@ class TRAMMEL_API Model {
   [[nodiscard]] Evaluation figures() const;
   /// The training poses that its promise is about.
   [[nodiscard]] Measured measured() const;
-  /// Where the millimetres come from: JSON, as `budget` of `trammel train --json`; `null` where no
-  /// training pose has a position.
+  /// The error budget: JSON, as `budget` of `trammel train --json`; `null` if no training pose has
+  /// a position.
   [[nodiscard]] std::string budget_json() const;
   /// The notes that a user of the model should know, the gravest first.
   [[nodiscard]] std::vector<Note> notes() const;
 
-  /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a
+  /// The expected error at N joint vectors, given one after the other (N x n values, deg; for a
   /// rail mm). Refuses joints beyond the robot's limits, numbers that are not finite, and a tool
   /// with a payload that no training pose had.
   [[nodiscard]] Result<std::vector<Prediction>> predict(std::span<const double> joints_deg,
                                                         const Context& context = {}) const;
-  /// The commands by which the tool lands on each target. A target that cannot be corrected says
-  /// so in its status. Refuses targets that are none (wrong number of joints, no branch, no unit
-  /// quaternion), and tools as predict() does.
+  /// The commands by which the tool lands on each target. A target that cannot be corrected says so
+  /// in its status. Refuses invalid targets (wrong number of joints, no branch, a quaternion that
+  /// is not normalised), and the same tools as predict().
   [[nodiscard]] Result<std::vector<CorrectedTarget>> correct(std::span<const Target> targets,
                                                              const Context& context = {}) const;
   /// Measured against predicted. Several batches are sessions of one arm.
@@ -200,15 +200,15 @@ struct TrainOptions {
   std::uint64_t seed = 1;           ///< of the search for hyperparameters and of the rows held out
   double validation_share = 0;      ///< of the rows, held out where the batch has no column `set`
   Progress progress;                ///< may be empty
-  bool as_read = false;  ///< somebody has looked at the batches: learn from them as they are
-  std::vector<Model> fleet = {};  ///< of robots of the same type, at least three: what they have in
-                                  ///< common is expected of this one. A cell with `prior: fleet`
-                                  ///< needs them
+  bool as_read = false;  ///< a person has looked at the batches: learn from them as they are
+  std::vector<Model> fleet = {};  ///< of robots of the same type, at least three: their common
+                                  ///< values become the prior of this one. A cell with `prior:
+                                  ///< fleet` needs them
 };
 /// A model of the cell, from batches of measurements. Several batches are sessions of one arm.
-/// Refuses what the service keeps out: a batch that was read wrongly, or in the middle of which
-/// something changed. With `as_read` the model's notes tell that instead, and with `fleet` in what
-/// the robot is unlike its twins.
+/// Refuses the batches that a service quarantines: a misread batch, or one with a change in its
+/// middle. With `as_read` the model's notes report that instead; with `fleet` they report in which
+/// parameters the robot differs from its twins.
 [[nodiscard]] TRAMMEL_API Result<Model> train(const Cell& cell, std::span<const Batch> batches,
                                               const TrainOptions& options = {});
 
@@ -217,21 +217,21 @@ struct DiagnoseOptions {
   std::uint64_t seed = 1;  ///< of the bootstrap
   Progress progress;       ///< may be empty
 };
-/// The causes that the cell's model lacks, as JSON: the text that `trammel diagnose --json` writes.
+/// The causes that the cell's model lacks, as JSON: the output of `trammel diagnose --json`.
 [[nodiscard]] TRAMMEL_API Result<std::string> diagnose(const Cell& cell,
                                                        std::span<const Batch> batches,
                                                        const DiagnoseOptions& options = {});
 
-/// The worth of extending a cell by what a diagnosis found.
+/// The gain of extending a cell by the findings of a diagnosis.
 struct Extension {
   std::string findings;        ///< the diagnosis, as diagnose() writes it
   std::optional<Model> model;  ///< the extended model; empty where it is not to be applied
-  std::vector<std::string> error_sources;  ///< of it, those that belong into the cell file
+  std::vector<std::string> error_sources;  ///< those of it that belong in the cell file
   std::string why_not;  ///< why nothing is applied, in the words of every door; empty: apply it
 };
-/// Does what `trammel diagnose --apply` does, without writing anything: some rows are set aside
-/// before the batch is looked at, the cell is extended by what is found, and the model is one to
-/// apply where a service would put it in force.
+/// Does the same as `trammel diagnose --apply` without writing anything: it sets some rows aside
+/// before it examines the batch, extends the cell by the findings, and recommends the model if a
+/// service would put it in force.
 [[nodiscard]] TRAMMEL_API Result<Extension> extend(const Cell& cell, std::span<const Batch> batches,
                                                    const DiagnoseOptions& options = {});
 

@@ -5,7 +5,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-/// Marks what may leave libtrammel.
+/// Marks the exported symbols of libtrammel.
 #define TRAMMEL_API __attribute__((visibility("default")))
 
 /// Trammel for other programs. Nothing here throws. Lengths are mm and angles deg, as in files and
@@ -14,8 +14,8 @@ namespace trammel::api {
 
 /// The kind of an error.
 enum class ErrorCode {
-  kUsage,        ///< something was asked for that does not exist, or an argument of the wrong size
-  kRefused,      ///< data that must not be used: a bad row, an unknown tool, an ill-conditioned fit
+  kUsage,    ///< the request names something that does not exist, or an argument has the wrong size
+  kRefused,  ///< data that must not be used: a bad row, an unknown tool, an ill-conditioned fit
   kNotFound,     ///< an unknown cell, model or job
   kConflict,     ///< the same id with other content, a second writer
   kTooLarge,     ///< over a stated limit
@@ -30,17 +30,17 @@ enum class ErrorCode {
 /// An expected failure, as data. Members that are not known are empty.
 struct Error {
   ErrorCode code = ErrorCode::kInternal;  ///< its kind
-  std::string message;                    ///< one clause that says what, with value and limit
-  std::string file;                       ///< path or id of what was read: a file, a batch, a model
+  std::string message;                    ///< one clause with the fault, the value and the limit
+  std::string file;                       ///< path or id of the input: a file, a batch, a model
   std::optional<long>
       row;            ///< line of the file, from 1 with its header; of an array the index, from 0
   std::string field;  ///< column, key or argument
   std::optional<double> value;  ///< as given, in the unit of the field
-  std::optional<double> limit;  ///< the limit that was broken, in the same unit
+  std::optional<double> limit;  ///< the violated limit, in the same unit
   std::string text;             ///< the value as given, where it is a word
-  std::string next;             ///< what to do about it, as one clause
-  std::vector<Error> also;      ///< what else is wrong, found in the same reading
-  std::string sentence;         ///< all of it for people
+  std::string next;             ///< the next step for the user, as one clause
+  std::vector<Error> also;      ///< other errors found in the same reading
+  std::string sentence;         ///< the whole error for people
 };
 
 /// A value, or why there is none.

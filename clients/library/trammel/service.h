@@ -15,7 +15,7 @@
 /// The client of the service.
 namespace trammel::api {
 
-/// Where the service is.
+/// The place of the service.
 struct SessionOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0 to 232
   std::vector<std::uint16_t> ports = {
@@ -32,8 +32,8 @@ struct SessionOptions {
 /// The subject of a call.
 struct Asked {
   std::string cell;                     ///< name of the cell
-  Context context;                      ///< what its arm carries, and how it comes there
-  bool controller_compensates = false;  ///< whether the controller corrects by itself already
+  Context context;                      ///< the load of its arm, and its approach
+  bool controller_compensates = false;  ///< true: the controller already corrects by itself
 };
 
 /// Answers, all from one model.
@@ -48,14 +48,14 @@ struct Job {
   std::int64_t id = 0;  ///< its number
   std::string cell;     ///< its cell
   std::string stage;    ///< `queued training storing done failed`
-  std::string what;     ///< what is being done, or what became of it
+  std::string what;     ///< the current step, or the outcome
   double share = 0;     ///< done of all, [0, 1]
   std::string
       verdict;  ///< `open in_force not_better undecided diagnosed quarantined refused broken ...`
-  int version = 0;        ///< of the model that it made; 0: none
-  bool in_force = false;  ///< whether that model serves its cell
-  std::string why;        ///< of a job that made no model
-  std::string next;       ///< what to do, as one clause
+  int version = 0;        ///< of the resulting model; 0: none
+  bool in_force = false;  ///< true if that model serves its cell
+  std::string why;        ///< for a job that made no model
+  std::string next;       ///< the next step for the user, as one clause
   std::string held_back;  ///< why a person decides about it: `few_judges stop_note step_limit`;
                           ///< empty: the poses held out decide
 };
@@ -64,17 +64,16 @@ struct Job {
 struct Server {
   std::string id;                  ///< its name
   std::string version;             ///< of its program
-  std::string state;               ///< what it does
-  std::vector<std::string> cells;  ///< that it serves
-  std::string trouble;             ///< what it cannot do now, and why; empty: nothing
+  std::string state;               ///< its current activity
+  std::vector<std::string> cells;  ///< the cells that it serves
+  std::string trouble;             ///< its present trouble and the reason; empty: none
   double uptime_s = 0;             ///< since its start, s
-  int queued_jobs = 0;             ///< that wait
+  int queued_jobs = 0;             ///< the waiting ones
 };
 
 /// One client of the service; one per process is enough. Thread-safe; calls from several threads
-/// overlap. A request without an answer is sent once more with the same id, so what changes
-/// something happens once. Errors: kUnreachable where no server answered in time, else the
-/// server's.
+/// overlap. A request without an answer is sent once more with the same id, so a change happens
+/// once. Errors: kUnreachable if no server answered in time, else the server's.
 class TRAMMEL_API Session {
  public:
   /// Does not wait for a server.
@@ -105,37 +104,37 @@ class TRAMMEL_API Session {
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv) const;
   /// Trains from stored batches (empty: the newest) and returns the job. `level` and `bias`
-  /// instead of what the cell asks for; empty: as it asks.
+  /// override the cell's; empty: the cell's.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell,
                                              const std::vector<std::string>& batch_ids = {},
                                              const std::string& level = {},
                                              const std::string& bias = {}) const;
-  /// Asks what the cell's model lacks by a stored batch (its id; empty: the newest) or, with `csv`,
-  /// by measurements that are not kept. Returns the job; once it is done, findings() has what
-  /// `trammel diagnose --json` prints. With `apply` a model with the causes found is trained, and
-  /// put in force if it is better.
+  /// Diagnoses what the cell's model lacks, from a stored batch (its id; empty: the newest) or,
+  /// with `csv`, from measurements that are not kept. Returns the job; once it is done, findings()
+  /// has the output of `trammel diagnose --json`. With `apply` a model with the causes found is
+  /// trained, and put in force if it is better.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell,
                                               const std::string& batch_id = {},
                                               const std::string& csv = {},
                                               bool apply = false) const;
-  /// Asks whether the robot is still as its model in force has it, by a few poses, stored or in
-  /// `csv`. `tolerance_mm` instead of what the cell holds. Returns the job; then findings() has
-  /// what `trammel check --json` prints.
+  /// Checks with a few poses, stored or in `csv`, whether the robot is still as its model in force
+  /// has it. `tolerance_mm` overrides the cell's. Returns the job; then findings() has the output
+  /// of `trammel check --json`.
   [[nodiscard]] Result<std::int64_t> check(const std::string& cell,
                                            const std::string& batch_id = {},
                                            const std::string& csv = {},
                                            std::optional<double> tolerance_mm = {}) const;
   /// The findings of a diagnosis or a check that is done: JSON.
   [[nodiscard]] Result<std::string> findings(const std::string& cell, std::int64_t job) const;
-  /// Waits until the job is done or failed, and tells `listener`, if any, how far it is.
+  /// Waits until the job is done or failed, and reports its progress to `listener`, if any.
   /// kUnreachable: `limit` is over. kNotFound: no server knows it.
   [[nodiscard]] Result<Job> wait_for(std::int64_t job, std::chrono::milliseconds limit,
                                      const std::function<void(const Job&)>& listener = {}) const;
   /// Jobs that wait or run or ended lately, of one cell or (empty) of all, oldest first.
   [[nodiscard]] Result<std::vector<Job>> jobs(const std::string& cell) const;
-  /// Puts a version in force; refused where `expected_version` is not, and where it is worse than
-  /// the version in force or cannot be judged, unless `force` is said. `reason` is for the audit
-  /// trail.
+  /// Puts a version in force. Refused if `expected_version` is not in force. Refused, unless
+  /// `force` is set, if it is worse than the version in force or cannot be judged. `reason` is for
+  /// the audit trail.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version,
                                      const std::string& reason = {},
                                      std::optional<int> expected_version = {},
@@ -147,7 +146,7 @@ class TRAMMEL_API Session {
   /// not in force.
   [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {},
                                       std::optional<int> expected_version = {}) const;
-  /// Lets a batch out of quarantine, so that models may learn from it; refused where
+  /// Releases a batch from quarantine, so that models may learn from it. Refused if
   /// `expected_version` is not in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id,
                                const std::string& reason = {},

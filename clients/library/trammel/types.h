@@ -21,7 +21,7 @@ struct Context {
   std::string payload;  ///< likewise
   std::vector<int>
       directions;  ///< from which each joint is approached: -1, 0, +1; empty: not known
-  std::optional<double> temperature_c;  ///< degrees Celsius; empty: that of the training
+  std::optional<double> temperature_c;  ///< degrees Celsius; empty: the temperature of the training
 };
 
 /// A wanted pose of the tool, or joints whose nominal pose is wanted.
@@ -33,7 +33,7 @@ struct Target {
       conf;  ///< branch 0..7: +4 wrist behind axis 1, +2 behind the lower arm, +1 joint 5 < 0
 };
 
-/// A note that a user of a model should know, in the words of the command line and of the service.
+/// A note for users of a model, in the words of the command line and of the service.
 struct Note {
   std::string code;      ///< for programs: `robot_not_confirmed`
   std::string severity;  ///< `info`; `warning`: figures mean less than they seem to; `stop`: a
@@ -48,16 +48,16 @@ struct ModelFacts {
   std::string cell;        ///< its cell
   std::string level;       ///< its error sources, joined by commas
   std::string batch;       ///< batch that it was trained on
-  int training_poses = 0;  ///< how many it learned from
+  int training_poses = 0;  ///< the number of poses that it learned from
   int version = 0;         ///< of a service; 0: from a file
-  bool in_force = false;   ///< of a service: whether its cell is served with it
+  bool in_force = false;   ///< of a service: true if its cell is served with it
   std::vector<Note>
-      notes;  ///< the gravest first; in a service's list of versions only of the one in force
-  std::vector<std::string> budget;  ///< where the millimetres come from, its first lines for
-                                    ///< people; of a service: of the one in force, when listed
+      notes;  ///< the gravest first; in a service's list of versions only the one in force has them
+  std::vector<std::string> budget;  ///< the first lines of the error budget, for people; from a
+                                    ///< service only for the listed version in force
 };
 
-/// Told what is being done and which share of it is done, [0, 1]. Returns false to give up (kBusy).
+/// Receives the current step and the share done, [0, 1]. Returns false to give up (kBusy).
 using Progress = std::function<bool(const std::string& stage, double share)>;
 
 }  // namespace trammel::api

@@ -1,4 +1,4 @@
 #pragma once
 
-// What is installed as this header is the room's own.
+// The installed header is a copy of the room's own.
 #include "server/exchange/values.h"
