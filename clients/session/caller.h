@@ -21,17 +21,17 @@
 
 namespace trammel::client {
 
-/// To which server a call goes, and how it is repeated.
+/// The server of a call, and the way in which the call is repeated.
 struct Route {
   std::string cell;  ///< preferred: a server that serves this cell
   std::string
-      server;  ///< only to this one, or to another one of its record as `record` says; empty: any
+      server;  ///< only this server, or another one of its record as `record` says; empty: any
   bool changes_something =
-      false;  ///< a repeat goes to the same server, or where that one has left to its record
-  bool may_be_long = false;  ///< an answer from the record: silence for a moment does not mean that
-                             ///< nobody is there
+      false;  ///< a repeat goes to the same server or, if that one has left, to its record
+  bool may_be_long = false;  ///< the answer comes from the record, so a moment of silence does not
+                             ///< mean that the server is gone
   std::string record =
-      {};  ///< of `server`, where any server of the same record can answer for it; else empty
+      {};  ///< of `server`, if any server of the same record can answer for it; else empty
 };
 
 /// One operation of a session: a request writer, a reply reader in the session's partition, and the
@@ -69,8 +69,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (reader_ != nullptr) subscriber_.delete_datareader(reader_);
   }
 
-  /// Sends the request to a server whose reader and writer are matched, and again as Sending says,
-  /// always with the same id: the first answer counts. kUnreachable: no answer by `deadline`.
+  /// Sends the request to a server whose reader and writer are matched, and repeats it as Sending
+  /// says, always with the same id: the first answer counts. kUnreachable: no answer by `deadline`.
   [[nodiscard]] Result<Reply> call(Request request, const Route& route,
                                    Clock::time_point deadline) {
     request.header().contract_version(wire::CONTRACT_VERSION);
@@ -113,16 +113,16 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
         partition_(std::move(partition)),
         watch_(watch) {}
 
-  /// The times that a request is sent. What all servers answer alike is asked of a second one where
-  /// the first is silent for kHedge, or leaves. At half of the time it is sent once more; what
-  /// changes something to the same server, or, where that one has left, to another one of its
-  /// record: those make a change once under its id. Once more where who was asked has left only
-  /// then.
+  /// The times at which a request is sent. A request that all servers answer alike goes to a second
+  /// one if the first is silent for kHedge, or leaves. At half of the time it is sent once more. A
+  /// change then goes to the same server or, if that one has left, to another one of its record,
+  /// since these make a change once under its id. It is sent once more if the server leaves only
+  /// later.
   enum class Sending { kFirst, kHedge, kAgain, kOfOthers };
   struct Asked {
     std::set<std::string> participants;
     std::string first, last;  ///< servers
-    std::string record;       ///< of the last one; empty: its own
+    std::string record;       ///< the record of the last server; empty: a record of its own
   };
 
   Result<Reply> attempt(Request& request, const Route& route, Clock::time_point deadline) {
@@ -171,8 +171,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       return watch_.another_server(route.cell, asked.last, [&](const auto& known) {
         return reachable(known.participant, true);
       });
-    // The repeat may also go to a server whose reply writer is not matched yet: it may have had too
-    // many clients.
+    // The repeat may also go to a server whose reply writer is not matched yet, since that server
+    // may have had too many clients.
     const bool and_back = sending == Sending::kFirst;
     const std::string avoided =
         route.changes_something || has_left(asked.participants) ? std::string() : asked.last;
@@ -191,7 +191,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     return shares(asked.record) && serves(known, route.cell) && has_left(asked.participants);
   }
 
-  /// Waits until it is there, or all that were asked have left.
+  /// Waits until the reply is there, or until all servers that got the request have left.
   [[nodiscard]] std::optional<Reply> wait_for_reply(std::int64_t sequence,
                                                     const std::set<std::string>& asked,
                                                     Clock::time_point until) {

@@ -9,11 +9,12 @@
 namespace trammel::client {
 namespace {
 
-constexpr std::uint32_t kHighestDomain = 232;   // of ports that are numbers of UDP
+constexpr std::uint32_t kHighestDomain = 232;   // above it, the ports of DDS exceed those of UDP
 constexpr std::size_t kHomesRemembered = 1000;  // of a session's jobs
 constexpr int kShareOfLooking = 2;  // of the timeout: its half at most, for discovery servers
 
-/// Adds the servers that the discovery servers tell of. It does without any where others are named.
+/// Adds the servers that the discovery servers announce. If other servers are named, none of these
+/// is needed.
 Status add_found_places(SessionOptions& options) {
   const auto places = wire::look_for_places(options.discovery_servers, options.domain,
                                             options.timeout / kShareOfLooking);

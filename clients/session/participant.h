@@ -27,17 +27,17 @@ namespace trammel::client {
 [[nodiscard]] std::string make_name(const char* what);
 [[nodiscard]] std::string change_id(const ChangeOptions& options);
 [[nodiscard]] wire::Change to_wire(const ChangeOptions& options);
-/// The options with every server as a place, and the address of this host that leads there.
+/// The options with every server as a place, and with this host's address on the route there.
 [[nodiscard]] Result<SessionOptions> completed(SessionOptions options);
 [[nodiscard]] Result<wire::ParticipantPtr> participant_of(const SessionOptions& options);
 
-/// Share of the timeout that one part of a long call should take. At half of the timeout a request
-/// is sent again; this is far below.
+/// Share of the timeout that one part of a long call should take. It is far below the half after
+/// which a request is sent again.
 inline constexpr double kShareOfTimeout = 0.1;
 inline constexpr std::uint32_t kLeastPatience = 10;  // ms, before a busy server is asked again
 
-/// An operation's endpoints, made when it is first called: every client hears of every endpoint
-/// that the server has for another one.
+/// An operation's endpoints, made at its first call, since the server announces each of its
+/// endpoints to every client.
 template <typename Operation>
 struct Endpoints {
   Mutex mutex;
@@ -64,16 +64,15 @@ struct Session::Participant {
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
-  /// For error messages: how long it looked, on which ports, in which domain.
+  /// For error messages: the duration of the search, the ports, the domain.
   [[nodiscard]] std::string where_it_looked() const;
-  /// Where no server answered. One that refuses a certificate is as silent as one that is not
-  /// there.
+  /// The error if no server answered. A server that refuses a certificate is as silent as an absent
+  /// one.
   [[nodiscard]] Error not_answered(Error error) const;
   [[nodiscard]] Failure not_allowed(const char* operation) const;
   [[nodiscard]] Error no_server() const;
 
-  /// An error reply of the server is an error here, and one of no server says where it was looked
-  /// for.
+  /// An error reply becomes an error here. Without a server the error says where it was searched.
   template <typename Reply>
   [[nodiscard]] Result<Reply> as_result(Result<Reply> reply) const {
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
@@ -103,7 +102,7 @@ struct Session::Participant {
     return made.caller.get();
   }
 
-  /// Sends one request. A server that is busy has not done it and is asked again when it says,
+  /// Sends one request. A busy server has not done it, and gets it again after its stated pause,
   /// until the deadline; a change keeps its id.
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(
@@ -116,7 +115,7 @@ struct Session::Participant {
     while (true) {
       Result<Reply> reply = (*caller)->call(request, route, until);
       const bool too_late = reply && reply->header().result() == wire::RESULT_DEADLINE_MISSED;
-      // Why it was busy tells more than that too little time was left.
+      // The reason why it was busy is more useful than the message that too little time was left.
       if (busy && too_late) return as_result<Reply>(*std::move(busy));
       if (busy && !reply)
         reply.error().message += "; before, it was busy: " + error_of(busy->header()).message;
@@ -149,17 +148,17 @@ struct Session::Participant {
                                              const ChangeOptions& change,
                                              wire::ReleaseBatchesRequest request);
 
-  /// The job that was accepted, and remembers by whom: every server counts its own jobs.
+  /// Remembers the server that accepted the job, since every server numbers its own jobs.
   template <typename Reply>
   [[nodiscard]] std::int64_t accepted(const Reply& reply) {
     remember(reply.job(), reply.header().server().to_string());
     return reply.job();
   }
   void remember(std::int64_t job, const std::string& server);
-  /// The job is over, as this session has been told.
+  /// Records that this session has seen the end of the job.
   void told(std::int64_t number, const std::string& server);
-  /// The servers that accepted a job of this number in this session, and have not told its end;
-  /// without one all that are known.
+  /// The servers that accepted a job of this number in this session and have not reported its end;
+  /// if there are none, all known servers.
   [[nodiscard]] std::set<std::string> may_have(std::int64_t number);
   /// The job as `server`, or another one of its record, knows it.
   [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number);

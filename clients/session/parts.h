@@ -27,8 +27,8 @@ class PartSize {
     const double fits = std::min(rate * wanted_.count(), static_cast<double>(kGrowth * next_));
     next_ = std::clamp(static_cast<std::size_t>(fits), std::size_t{1}, most_);
   }
-  /// No answer came in time to a part of so many items: its items take longer than those before. No
-  /// part is as long again.
+  /// A part of so many items got no answer in time, since its items take longer than earlier ones.
+  /// Later parts are shorter.
   void timed_out(std::size_t items) {
     most_ = std::max(std::size_t{1}, items / 2);
     next_ = std::max(std::size_t{1}, items / kGrowth);
@@ -48,9 +48,9 @@ template <typename Item>
 using AskPart = std::function<Result<exchange::Answer<Item>>(std::size_t first, std::size_t count)>;
 
 /// The answers to `items` items, all from one model. If the model changes between two parts, all
-/// items are asked again. A part that is not answered in time, or that a busy server has no time
-/// for, is asked again in smaller ones, a few times. kBusy: that did not help, or the model changed
-/// again and again. `progress` may be empty; `now` is the clock.
+/// items are requested again. A part without an answer in time, or one that a busy server rejects,
+/// is repeated in smaller parts, a few times. kBusy: that did not help, or the model kept changing.
+/// `progress` may be empty; `now` is the clock.
 template <typename Item>
 [[nodiscard]] Result<exchange::Answer<Item>> ask_in_parts(
     std::size_t items, const std::string& cell, PartSize size, const AskPart<Item>& ask,

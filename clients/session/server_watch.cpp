@@ -176,8 +176,9 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
   MutexLock lock(mutex_);
   changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod,
                       [this]() TRAMMEL_REQUIRES(mutex_) { return knows_all_models(); });
-  // Where servers differ for a moment, what was told last: all of one record come to that.
-  std::map<std::string, std::pair<double, wire::ModelInfo>> last;  // by cell, with how long ago, s
+  // If servers differ for a moment, the newest information counts, since all servers of one record
+  // converge to it.
+  std::map<std::string, std::pair<double, wire::ModelInfo>> last;  // by cell, with its age, s
   for (const auto& [key, known] : models_) {
     wire::ModelInfo model = known.model;
     const double since_s = age_s(key.first, known);

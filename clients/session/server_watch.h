@@ -23,7 +23,7 @@ struct KnownServer {
   std::string participant;
   wire::ServiceStatus status;
   Clock::time_point heard;
-  double written_s = 0;  ///< when the status was written, by the server's clock for what it writes
+  double written_s = 0;  ///< the time of the status, by the server's clock for its samples
 
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
 };
@@ -36,13 +36,13 @@ struct OtherServer {
   std::uint32_t contract = 0;
 };
 
-/// A model in force, and when a server described it so, by its clock for what it writes.
+/// A model in force, and the time of that description, by the server's clock for its samples.
 struct KnownModel {
   wire::ModelInfo model;
   double written_s = 0;
 };
 
-/// The servers that are there, and what they published on the state topics. Thread-safe.
+/// The present servers, and their publications on the state topics. Thread-safe.
 class ServerWatch {
  public:
   /// `named`: how many servers the client names.
@@ -50,34 +50,35 @@ class ServerWatch {
       wire::dds::DomainParticipant& participant, wire::dds::Subscriber& subscriber,
       std::size_t named);
 
-  /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then
+  /// Chooses among the servers that `reachable` accepts. It prefers one that serves `cell`, then
   /// one that published its status lately, then one that is not `avoid`, then one that was not
-  /// slower than another one lately (was_slow()). Waits until `deadline` for the first server, less
-  /// long where all that are there speak another contract. One that does not serve the cell is
-  /// taken only when no other can be expected: all named servers are known, or kStatusLost is over.
+  /// slower than another lately (was_slow()). Waits until `deadline` for the first server, less if
+  /// all present ones use another contract. A server without the cell is taken only if no other can
+  /// be expected: all named servers are known, or kStatusLost is over.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(
       const std::string& cell, const std::string& avoid, Clock::time_point deadline,
       const std::function<bool(const KnownServer&)>& reachable);
-  /// wait_for_server() without waiting, and never `avoid` nor one that does not serve the cell.
+  /// wait_for_server() without waiting; never `avoid`, and never one that does not serve the cell.
   [[nodiscard]] std::optional<KnownServer> another_server(
       const std::string& cell, const std::string& avoid,
       const std::function<bool(const KnownServer&)>& reachable);
-  /// Another server answered before this one did: others are asked first until it is heard of
+  /// Another server answered before this one: others are preferred until this one is heard of
   /// again.
   void was_slow(const std::string& server);
-  /// Why no server is found, where the only ones that are there speak another contract than this
+  /// The reason why no server is found, if the present ones all use another contract than this
   /// program.
   [[nodiscard]] std::optional<Error> other_contract() const;
-  /// The mark that tells the record of the server from any other, also where it has left; empty: it
-  /// has one of its own.
+  /// The mark that identifies the record of the server, even after it has left; empty: it has a
+  /// record of its own.
   [[nodiscard]] std::string record_of(const std::string& server) const;
   /// Lets the time pass.
   void wait_until(Clock::time_point time);
   /// Call when the result of `reachable` may have changed: waiting calls look again.
   void wake();
 
-  /// Waits until `count` servers are known, or until `deadline`. The others are expected for half a
-  /// status period after the first one, once: one that is down costs no later call any time.
+  /// Waits until `count` servers are known, or until `deadline`. It waits for the others for half a
+  /// status period after the first one, and only once. So a server that is down delays no later
+  /// call.
   [[nodiscard]] std::vector<KnownServer> wait_for_servers(std::size_t count,
                                                           Clock::time_point deadline);
   /// Waits until the models in force are as many as the servers report, one status period at most.
@@ -93,8 +94,8 @@ class ServerWatch {
  private:
   explicit ServerWatch(std::size_t named) : named_(named) {}
   void on_contract(const wire::SpokenContract* spoken, const std::string& participant);
-  /// True if waiting for a server is in vain: those that are there speak another contract, and have
-  /// been for a while.
+  /// True if waiting for a server is in vain: the present ones use another contract, and have done
+  /// so for a while.
   [[nodiscard]] bool in_vain() const TRAMMEL_REQUIRES(mutex_);
   /// Waits until `found`, and gives up at `deadline` or when it is in vain.
   template <typename Found>
@@ -110,8 +111,8 @@ class ServerWatch {
   /// True if `chosen` serves the cell, or no named server does.
   [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const
       TRAMMEL_REQUIRES(mutex_);
-  /// The time since the model was described so, by its server's clock alone: others may differ from
-  /// it, or be set.
+  /// The time since that description of the model, by its server's clock alone, since other clocks
+  /// may differ or be set.
   [[nodiscard]] double age_s(const std::string& participant, const KnownModel& known) const
       TRAMMEL_REQUIRES(mutex_);
   /// True if as many models of every server are known as it reports.
@@ -125,7 +126,7 @@ class ServerWatch {
   std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   Clock::time_point others_expected_until_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, std::string> records_
-      TRAMMEL_GUARDED_BY(mutex_);  // by id, also of those that have left
+      TRAMMEL_GUARDED_BY(mutex_);  // by id, including servers that have left
   std::map<std::string, Clock::time_point> slow_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   std::map<std::pair<std::string, std::string>, KnownModel> models_
       TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell

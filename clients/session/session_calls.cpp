@@ -10,7 +10,7 @@ namespace trammel::client {
 namespace {
 
 constexpr std::chrono::milliseconds kJobPoll{2000};
-constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
+constexpr std::chrono::milliseconds kLook{50};  // between two looks at the servers' states
 
 bool is_over(const JobStatus& job) {
   return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled";

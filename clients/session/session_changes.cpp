@@ -1,4 +1,4 @@
-// The changes that a session asks of a server: batches, trainings, what is in force.
+// The changes that a session requests from a server: batches, trainings, versions in force.
 #include <algorithm>
 
 #include "clients/session/participant.h"

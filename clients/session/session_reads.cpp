@@ -1,4 +1,4 @@
-// The data that a session reads of servers: batches, jobs, models, what was found.
+// The data that a session reads from servers: batches, jobs, models, findings.
 #include <algorithm>
 #include <functional>
 
@@ -7,17 +7,17 @@
 namespace trammel::client {
 namespace {
 
-/// True if two servers tell of one job: they have one record.
+/// True if both entries are the same job: their servers have one record.
 bool is_same(const wire::Job& a, const wire::Job& b) {
   return a.number() == b.number() && a.cell() == b.cell() && a.kind() == b.kind() &&
          a.created_unix_s() == b.created_unix_s() && a.batch_ids() == b.batch_ids();
 }
 
-/// Adds what no other server has told already: several have one record.
+/// Adds the items that no other server has listed already, since several servers have one record.
 template <typename Item, typename IsSame>
 void add_new(std::vector<std::pair<Item, std::string>>& all, const std::vector<Item>& told,
              const std::string& server, const IsSame& is_same) {
-  const auto before = static_cast<std::ptrdiff_t>(all.size());  // a server tells each once
+  const auto before = static_cast<std::ptrdiff_t>(all.size());  // a server sends each once
   for (const Item& item : told) {
     const auto known = [&](const auto& other) { return is_same(other.first, item); };
     if (std::none_of(all.begin(), all.begin() + before, known)) all.emplace_back(item, server);
@@ -69,7 +69,7 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
   std::vector<std::pair<wire::Job, std::string>> told;
   for (const wire::ReadModelsReply& reply : replies)
     add_new(told, reply.jobs(), reply.header().server().to_string(), is_same);
-  // Who works on a job knows best how far it is.
+  // The server that works on a job knows its progress best.
   for (const wire::ReadModelsReply& reply : replies) {
     for (const wire::Job& job : reply.jobs()) {
       if (job.server() != reply.header().server().to_string()) continue;
