@@ -1,5 +1,5 @@
-// The inside of the Python package: libtrammel with NumPy arrays. trammel/__init__.py is what
-// people see of it.
+// The extension module of the Python package: libtrammel with NumPy arrays. Users see
+// trammel/__init__.py.
 #include <pybind11/functional.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -69,7 +69,7 @@ void raise(const api::Error& error) {
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
 }
 
-/// The exception that Python raised while it was told of the progress; the work is given up then.
+/// The exception that a Python progress function raised; the work then ends.
 class Told {
  public:
   explicit Told(py::object listener) : listener_(std::move(listener)) {}
@@ -93,8 +93,8 @@ class Told {
   std::optional<py::error_already_set> raised_;
 };
 
-/// The result of `work(progress)`, which runs without the interpreter's lock; or what the listener
-/// raised.
+/// The result of `work(progress)`, which runs without the interpreter's lock; or the exception of
+/// the progress function.
 template <typename Work>
 auto told_of(const py::object& listener, const Work& work) {
   Told told(listener);
@@ -114,7 +114,8 @@ std::vector<double> rows_of(const Numbers& array, const std::string& argument,
   return {array.data(), array.data() + array.size()};
 }
 
-/// An array of shape (N, columns), or (N,) for one column, from what `of` points to in each item.
+/// An array of shape (N, columns), or (N,) for one column, from the data that `of` points to in
+/// each item.
 template <typename Item, typename Of>
 py::array_t<double> table(const std::vector<Item>& items, py::ssize_t columns, const Of& of) {
   const auto rows = static_cast<py::ssize_t>(items.size());
