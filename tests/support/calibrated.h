@@ -10,7 +10,7 @@
 
 namespace trammel::test {
 
-/// The identified parameter of that name; the test fails where there is none.
+/// The identified parameter with that name; the test fails if there is none.
 inline const IdentifiedParameter& parameter(const CalibrationResult& result,
                                             const std::string& name) {
   const auto found =

@@ -12,8 +12,8 @@
 
 namespace trammel::test {
 
-/// Clients that submit batches and put versions 1 and 2 of cell-7 in force by turns, each change
-/// under an id of its own until it is acknowledged. They remember what was, and when.
+/// Clients that submit batches and alternately put versions 1 and 2 of cell-7 in force, each change
+/// under an id of its own until it is acknowledged. They record what happened, and when.
 class ChangeLoad {
  public:
   using Clock = std::chrono::steady_clock;
@@ -30,7 +30,7 @@ class ChangeLoad {
   [[nodiscard]] std::size_t acknowledged() const;
   /// From `since` on the longest time without an acknowledgement.
   [[nodiscard]] double longest_pause_s(Clock::time_point since) const;
-  /// Of what was acknowledged the ids that are not among these.
+  /// The ids of acknowledged changes that are not among these.
   [[nodiscard]] std::set<std::string> not_in(const std::set<std::string>& batches,
                                              const std::set<std::string>& changes) const;
 
@@ -40,11 +40,12 @@ class ChangeLoad {
                           const std::string& csv);
 
   client::SessionOptions servers_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   mutable std::condition_variable_any changed_;
   std::set<std::string> batches_, changes_;
   std::vector<Clock::time_point> when_;
-  std::vector<Clock::time_point> last_begun_;  // of each client the last that was acknowledged
+  std::vector<Clock::time_point> last_begun_;  // for each client, the start of its last
+                                               // acknowledged change
   std::vector<std::jthread> clients_;          // last: they use all the rest
 };
 

@@ -27,7 +27,7 @@ struct Hidden {
 /// The rows that such a check measures.
 [[nodiscard]] MeasurementBatch measured_check(const CheckedRobot& robot, const Hidden& hidden,
                                               std::uint64_t seed);
-/// What a check of the planned poses says of the robot as it is now.
+/// The result of a check of the planned poses with the robot in its present state.
 [[nodiscard]] HealthCheck checked(const CheckedRobot& robot, const Hidden& hidden,
                                   std::uint64_t seed, const HealthOptions& options);
 

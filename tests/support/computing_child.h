@@ -7,17 +7,17 @@
 #include <string>
 #include <vector>
 
-/// The process that a service, or a trainer in this process, computes a job in.
+/// The process in which a service, or a trainer in this process, computes a job.
 namespace trammel::test {
 
-/// What starts one: the shipped daemon.
+/// The program that starts one: the shipped daemon.
 [[nodiscard]] std::vector<std::string> compute_program();
 
 /// The child of `parent` that computes; empty while there is none.
 [[nodiscard]] std::optional<pid_t> computing_child(pid_t parent);
 
-/// A process that is looked at from outside, also one that is no child of ours. Its number stays
-/// its own meanwhile.
+/// A process that is watched from outside, even one that is not our child. Its pid is not reused
+/// meanwhile.
 class Watched {
  public:
   explicit Watched(pid_t pid);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::chrono::seconds kLimit{30};
 
-/// The shipped cell, but that a bias is always learned: a training takes its time, and there is one
-/// to be served.
+/// The shipped cell, with a bias that is always learned, so that a training takes time and gives a
+/// model to serve.
 std::string cell_with_a_bias() {
   std::string text = read_file(shipped_cell_file());
   const auto replace = [&](const std::string& what, const std::string& by) {

@@ -14,15 +14,15 @@ namespace trammel::test {
 
 [[nodiscard]] std::string trammeld_path();
 
-/// A trammeld that serves the shipped virtual cell from a folder of its own, on a port that no test
-/// running at the same time has (own_ports()). May be stopped, killed and started again on the same
+/// A trammeld that serves the shipped virtual cell from a folder of its own, on a port that no
+/// concurrent test has (own_ports()). It may be stopped, killed and started again on the same
 /// store.
 class Daemon {
  public:
-  /// `number`: the second one (1) of a test, on the port beside the first one's (0).
+  /// `number`: 1 for a second daemon of a test, on the port beside that of the first one (0).
   explicit Daemon(int number = 0);
 
-  /// Until it says that it is ready; fails the test when it does not.
+  /// Waits until it is ready; the test fails if it does not get ready.
   void start();
   /// SIGKILL, and until it is gone.
   void kill();
@@ -30,7 +30,7 @@ class Daemon {
   [[nodiscard]] std::optional<int> stop();
 
   [[nodiscard]] Process& process() { return *process_; }
-  /// What starts it, for tests that start another like it.
+  /// The command line that starts it, for tests that start another one like it.
   [[nodiscard]] std::vector<std::string> command_line() const;
   [[nodiscard]] std::string store_path() const { return folder_.file("trammel.db"); }
   [[nodiscard]] std::string config_path() const { return folder_.file("server.yaml"); }

@@ -8,7 +8,8 @@
 
 namespace trammel::test {
 
-/// What a test cannot go on without: the value, or the error on standard error and the end.
+/// The value of a Result that a test needs to go on. On an error it prints the error to standard
+/// error and ends.
 template <typename T>
 [[nodiscard]] T demand(Result<T> result) {
   if (!result) {

@@ -14,7 +14,7 @@ using hidden::HiddenCase;
 using hidden::HiddenCause;
 using hidden::Question;
 
-/// Row of the batch with that pose id, as the hidden cases number them; -1 for none.
+/// Row of the batch with that pose id, in the numbering of hidden cases; -1: none.
 int row_of(const std::string& pose_id) {
   return pose_id.size() < 2 ? -1 : std::stoi(pose_id.substr(1)) - 1;
 }
@@ -28,8 +28,7 @@ bool same_place(const Cause& said, const HiddenCause& cause) {
   return cause.joint == 0 || said.joint + 1 == cause.joint;
 }
 
-/// True if `said` means the cause hidden at `place`, and where it begins, `said` says where: near
-/// enough.
+/// True if `said` means the cause hidden at `place`. A beginning only has to be near enough.
 bool means(const Cause& said, const HiddenCase& hidden, std::size_t place) {
   const HiddenCause& cause = hidden.truth.causes[place];
   if (said.cause != cause.cause || !same_place(said, cause)) return false;
@@ -38,7 +37,7 @@ bool means(const Cause& said, const HiddenCase& hidden, std::size_t place) {
   return from < 0 || row < 0 || (row >= from && row <= to);
 }
 
-/// The place of what `said` means among the causes hidden.
+/// The index of the hidden cause that `said` means.
 std::optional<std::size_t> place_of(const Cause& said, const HiddenCase& hidden) {
   for (std::size_t k = 0; k < hidden.truth.causes.size(); ++k) {
     if (means(said, hidden, k)) return k;
@@ -46,8 +45,8 @@ std::optional<std::size_t> place_of(const Cause& said, const HiddenCase& hidden)
   return std::nullopt;
 }
 
-/// The causes that a reader is left with: where something was found, what it is said to be; where
-/// nothing was, what the batch is said not to tell.
+/// The candidate causes for a reader: the names and alternatives of the findings or, without a
+/// finding, the causes that the batch is said not to separate.
 std::vector<Cause> left_open(const Diagnosis& diagnosis) {
   std::vector<Cause> all;
   for (const Finding& finding : diagnosis.findings) {
@@ -141,7 +140,7 @@ std::string traceable_dependence(const HiddenCause& cause) {
   return cause.joint > 0 ? fmt::format("q{}", cause.joint) : "time";
 }
 
-/// `left_open`: what a reader is left with.
+/// `left_open`: the candidate causes for a reader.
 bool is_right_of_unrecorded(const Diagnosis& diagnosis, const HiddenCase& hidden,
                             const std::vector<Cause>& left_open) {
   const bool unnamed = diagnosis.findings.empty();

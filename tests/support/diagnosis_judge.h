@@ -7,10 +7,10 @@
 #include "server/diagnose/diagnosis.h"
 #include "tests/support/hidden_case.h"
 
-/// How what a diagnosis says stands against what was hidden.
+/// Compares the result of a diagnosis with the hidden causes.
 namespace trammel::test {
 
-/// A number that was found beside the one that was hidden, in the unit people read it in.
+/// A found number beside the hidden one, in the unit that people read.
 struct NumberFound {
   std::string name;
   double truth = 0, value = 0, u95 = 0;
@@ -19,19 +19,19 @@ struct NumberFound {
 
 struct Judgement {
   bool detected = false;  ///< says that something is there
-  bool exact = false;     ///< names everything that was hidden, rightly, and nothing else
+  bool exact = false;     ///< names all hidden causes correctly, and nothing else
   int right = 0;          ///< causes hidden that are named
-  int right_or_open = 0;  ///< causes hidden that are named or among what a finding leaves open
+  int right_or_open = 0;  ///< hidden causes that are named or left open by a finding
   int wrong = 0;          ///< causes named that were not hidden
-  int open = 0;           ///< findings that leave open which of several causes it is
+  int open = 0;           ///< findings that leave the choice between several causes open
   bool set_holds_truth =
-      false;  ///< the first cause hidden is among what a finding names or leaves open; where
-              ///< nothing was found, among what is said not to be told apart
-  bool over_confident = false;   ///< one single name for what cannot be told
+      false;  ///< the first hidden cause is among those that a finding names or leaves open;
+              ///< without a finding, among those said to be inseparable
+  bool over_confident = false;   ///< one single name although the causes cannot be separated
   bool unknown_rightly = false;  ///< unknown, of the right joints
   bool unrecorded_rightly =
-      false;  ///< of a cause whose column was withheld: found, however doubtful, or unknown of
-              ///< what it depends on; nothing or unknown where it cannot be traced
+      false;  ///< for a cause whose column was withheld: it was found, even if doubtful, or its
+              ///< dependence is unknown; if it cannot be traced: nothing was found, or unknown
   std::string said;  ///< `backlash:2`, `tool|geometry:d6`, `unknown q4`, `nothing`
   std::vector<NumberFound> numbers;
 };

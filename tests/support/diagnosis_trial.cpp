@@ -24,7 +24,7 @@ std::string text_of(const hidden::HiddenTruth& truth) {
   return text.empty() ? "nothing" : text;
 }
 
-/// The hidden simulation's word for what a diagnosis names.
+/// The hidden simulation's word for a named cause.
 HiddenCause as_hidden(const Cause& cause, int poses) {
   HiddenCause hidden{cause.cause, cause.joint + 1,        cause.parameter, -1,
                      {},          cause.order.value_or(0)};
@@ -47,7 +47,7 @@ std::vector<hidden::MeasuringPose> as_poses(const std::vector<JointVector>& join
   return poses;
 }
 
-/// True if the hidden simulation can make it without being told more.
+/// True if the hidden simulation can make the cause without further data.
 bool can_be_made(const HiddenCause& cause) {
   if (cause.cause == "geometry" || cause.cause == "compliance") {
     const auto& all = hidden::arm_parameters();
@@ -92,8 +92,8 @@ void compare_next_poses(const Diagnosis& diagnosis, const HiddenCase& hidden, Tr
   result.next_poses_measured = worth;
 }
 
-/// The closest imitator that is no richer than the truth: a richer one must be told from it by its
-/// riches.
+/// The closest imitator with at most as many numbers as the truth: a richer one must be rejected
+/// for its numbers.
 void find_rival(const HiddenCase& hidden, TrialResult& result) {
   for (const hidden::Rival& rival : closest_rivals(hidden)) {
     if (rival.values > hidden.world.effects.front().values.size()) continue;

@@ -7,34 +7,34 @@
 #include "server/diagnose/diagnose.h"
 #include "tests/support/diagnosis_judge.h"
 
-/// One effect hidden, one diagnosis asked for, from the three files alone, and what came of it.
+/// One hidden effect, one diagnosis from the three files alone, and its outcome.
 namespace trammel::test {
 
 struct Trial {
-  std::string row;  ///< of the table it counts for
+  std::string row;  ///< the row of the table to which it belongs
   hidden::HiddenSpec spec;
-  bool compare_with_oracle = false;  ///< of what the extended model does on the poses set aside
+  bool compare_with_oracle = false;  ///< of the extended model's effect on the held-out poses
   bool compare_next_poses = false;   ///< with random ones
 };
 
-/// Standard deviation of what is confounded: as it is, with ten suggested poses more, with ten
-/// random ones.
+/// Standard deviation of the confounded effect: with this batch, with ten suggested poses more,
+/// with ten random ones.
 struct NextPosesWorth {
   double now = 0, suggested = 0, random = 0;
 
   [[nodiscard]] double random_over_suggested() const { return random / suggested; }
-  /// How many times the reduction by random ones.
+  /// The ratio to the reduction by random ones.
   [[nodiscard]] double reduction() const { return (now - suggested) / (now - random); }
 };
 
 struct TrialResult {
   Trial trial;
   std::string truth;  ///< `backlash:2`
-  std::string error;  ///< why there is no diagnosis; else empty
+  std::string error;  ///< the reason why there is no diagnosis; else empty
   Judgement judgement;
   double seconds = 0;
-  /// Of the lambda asked for, what the closest imitator with as few parameters cannot make; empty
-  /// where not computed.
+  /// The share of the requested lambda that the closest imitator with as few parameters cannot
+  /// explain; empty: not computed.
   std::optional<double> beside_rival;
   std::string rival;
   double held_out_before_mm = 0, held_out_after_mm = 0;

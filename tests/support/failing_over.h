@@ -15,13 +15,13 @@ namespace trammel::test {
 class FailingOver {
  public:
   FailingOver();
-  /// As Patroni says it; nothing else may be asked then.
+  /// The reason from Patroni; then nothing else may be called.
   [[nodiscard]] const std::string& why_not() const { return record.why_not(); }
   [[nodiscard]] client::SessionOptions session_options() const;
 
-  /// Of what was acknowledged what the record does not hold.
+  /// Acknowledged changes that the record does not have.
   [[nodiscard]] std::set<std::string> lost(const ChangeLoad& load) const;
-  /// Changes and jobs that stand twice, and what is wrong with the trail; empty: nothing.
+  /// Changes and jobs that occur twice, and faults of the trail; empty: none.
   [[nodiscard]] std::string twice() const;
 
   Patroni record;

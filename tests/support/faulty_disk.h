@@ -14,9 +14,9 @@
 
 namespace trammel::test {
 
-/// The disk as SQLite sees it, while it lives: every file of SQLite goes through it. It refuses
-/// what it is told to, and remembers what was written, so that a power cut after any call can be
-/// played.
+/// The disk as SQLite sees it during the object's life: every file of SQLite goes through it. It
+/// refuses calls as instructed, and records writes, so that a power cut after any call can be
+/// replayed.
 class FaultyDisk {
  public:
   enum class Call { kOpen, kWrite, kSync, kTruncate, kDelete, kShared };
@@ -26,7 +26,7 @@ class FaultyDisk {
     sqlite3_int64 offset = 0;
     std::string bytes;
   };
-  /// SQLITE_OK, or what the call is to fail with. Called for each one, in order.
+  /// The result of each call, in order: SQLITE_OK, or the error with which it must fail.
   using Plan = std::function<int(Call call, const std::string& file)>;
 
   FaultyDisk() : real_(::sqlite3_vfs_find(nullptr)), vfs_(*real_) {
@@ -55,14 +55,14 @@ class FaultyDisk {
     set_plan([code](Call, const std::string&) { return code; });
   }
   void work_again() { set_plan(nullptr); }
-  /// How many calls there were.
+  /// The number of calls.
   std::size_t calls() {
     const std::lock_guard lock(mutex_);
     return events_.size();
   }
 
-  /// What the disk holds after a power cut behind the first `calls` calls. Of what was not
-  /// synchronised before each write is there, or not, or in its first half, as `random` says.
+  /// The content of the disk after a power cut behind the first `calls` calls. Each write that was
+  /// not synchronised is complete, missing, or present in its first half, by `random`.
   template <typename Random>
   void cut_power(std::size_t calls, Random& random, const std::filesystem::path& folder) {
     std::map<std::string, Content> files;

@@ -16,13 +16,13 @@
 
 namespace trammel::test {
 
-/// What the clients of a fleet ask about.
+/// The cells that the clients of a fleet use.
 struct AskedCell {
   std::string name;
   std::shared_ptr<const Cell> small;  ///< null: the shipped virtual cell
 };
 
-/// The batches that clients have submitted, whoever did. Thread-safe.
+/// The batches submitted by all clients. Thread-safe.
 class SharedBatches {
  public:
   explicit SharedBatches(int most) : most_(most) {}
@@ -31,9 +31,9 @@ class SharedBatches {
     std::string id;
     std::uint64_t seed = 0;
   };
-  /// A new one of the cell; empty: it has as many as it may.
+  /// A new batch of the cell; empty: the cell has its maximum.
   [[nodiscard]] std::optional<Batch> next(const std::string& cell);
-  /// One of those that there are.
+  /// A random existing batch.
   [[nodiscard]] std::optional<Batch> any(const std::string& cell, std::mt19937_64& random) const;
 
  private:
@@ -42,12 +42,12 @@ class SharedBatches {
   std::map<std::string, std::vector<Batch>> batches_;
 };
 
-/// The text of that batch; one in seven has two columns exchanged, and is kept in quarantine.
+/// The text of that batch; one in seven has two columns exchanged, and is quarantined.
 [[nodiscard]] std::string text_of(const AskedCell& cell, std::uint64_t seed);
 
-/// Asks one thing after the other, all kinds of changes and reads of all cells, and records each. A
-/// change that is not answered is asked for again under its id, of this server or another, until it
-/// is.
+/// Sends one request after the other, all kinds of changes and reads of all cells, and records
+/// each. A change without an answer is repeated under its id, to this server or another, until it
+/// is answered.
 class FleetClient {
  public:
   FleetClient(int number, const client::SessionOptions& first, const client::SessionOptions& other,

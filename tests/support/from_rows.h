@@ -5,8 +5,8 @@
 #include "server/tasks/train/extend.h"
 #include "server/tasks/train/train.h"
 
-/// What programs ask of a batch that is checked, for tests that begin with rows: each checks them
-/// first, and holds out what their `set` says.
+/// The functions for checked batches, for tests that begin with rows: each checks the rows first,
+/// and holds out those that their `set` says.
 namespace trammel {
 
 [[nodiscard]] inline Result<CompensatedModel> train(const std::shared_ptr<const Cell>& cell,
@@ -44,8 +44,8 @@ namespace trammel {
 
 namespace test {
 
-/// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for
-/// validation.
+/// `batch` with a set for every row: from its `set` column if it has one, otherwise `share` of the
+/// rows drawn for validation.
 [[nodiscard]] inline MeasurementBatch with_held_out(MeasurementBatch batch, double share,
                                                     std::uint64_t seed) {
   const std::vector<bool> held_out = rows_held_out(batch, share, seed);

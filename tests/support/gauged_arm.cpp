@@ -50,7 +50,7 @@ std::vector<hidden::MeasuringPose> some_poses(int count, std::uint64_t seed) {
   return hidden::draw_poses(plan, random);
 }
 
-/// Takes what a small rigid motion of all points makes out of `rows` (3 N x anything).
+/// Removes from `rows` (3 N x anything) the part that a small rigid motion of all points makes.
 Eigen::MatrixXd without_motion(const Eigen::Matrix3Xd& points, const Eigen::MatrixXd& rows) {
   Eigen::MatrixXd motion(rows.rows(), 6);
   const Eigen::Vector3d mean = points.rowwise().mean();

@@ -11,17 +11,16 @@
 #include "server/measurement/checked_batch.h"
 #include "tests/support/hidden_world.h"
 
-/// An arm of the second simulation, measured by instruments that tell one number of a pose.
+/// An arm of the second simulation, measured by instruments that give one number per pose.
 namespace trammel::test {
 
 struct GaugedArm {
   hidden::World world;
-  std::map<std::string, Eigen::Vector3d> anchors_mm;  ///< where they are, in the world
+  std::map<std::string, Eigen::Vector3d> anchors_mm;  ///< their places in the world
   std::shared_ptr<const Cell>
       cell;  ///< as drawn; its anchors as `anchors_yaml` of gauged_arm() says
 };
-/// `anchors_yaml`: what stands behind `anchors:`; empty: `anchors_mm` as they are. `more`: further
-/// lines.
+/// `anchors_yaml`: the text behind `anchors:`; empty: `anchors_mm`. `more`: further lines.
 [[nodiscard]] GaugedArm gauged_arm(std::uint64_t seed,
                                    const std::map<std::string, Eigen::Vector3d>& anchors_mm,
                                    const std::string& anchors_yaml = "",
@@ -40,8 +39,7 @@ struct GaugeRow {
   std::string minus_pose;  ///< id of a row
   Eigen::Vector3d p_mm = {0, 0, 0};
 };
-/// `count` poses whose tool is 0.3 to 3 m from the anchor that each is measured from, the anchors
-/// in turns.
+/// `count` poses with the tool 0.3 to 3 m from their anchor; the anchors take turns.
 [[nodiscard]] std::vector<GaugeRow> wire_rows(const GaugedArm& arm, int count, std::uint64_t seed,
                                               double zero_mm = 0);
 [[nodiscard]] std::vector<GaugeRow> position_rows(const GaugedArm& arm, int count,
@@ -52,13 +50,13 @@ struct GaugeRow {
 [[nodiscard]] MeasurementBatch gauge_batch(const GaugedArm& arm, const std::vector<GaugeRow>& rows,
                                            double sigma_mm, std::uint64_t seed);
 
-/// What the tool position is missed by, mm rms over poses that were not measured; `in_base`: but
-/// for a rigid motion of all of them, which is where the base stands.
+/// The error of the tool position, mm rms over unmeasured poses; `in_base`: after removing a rigid
+/// motion of all poses, which is the place of the base.
 [[nodiscard]] double volumetric_mm(const GaugedArm& arm, const CalibrationResult& found,
                                    bool in_base, std::uint64_t seed);
-/// The least that any estimate can miss by with these rows (Bayesian Cramér-Rao bound, derivatives
-/// of the second simulation, its parameters as uncertain as they may reasonably be off); `known`:
-/// the places of the anchors are.
+/// The smallest possible error of any estimate from these rows (Bayesian Cramér-Rao bound, with
+/// derivatives of the second simulation and reasonable uncertainties of its parameters); `known`:
+/// the places of the anchors are known.
 [[nodiscard]] double least_volumetric_mm(const GaugedArm& arm, const std::vector<GaugeRow>& rows,
                                          double sigma_mm, bool known, bool in_base,
                                          std::uint64_t seed);

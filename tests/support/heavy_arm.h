@@ -9,7 +9,7 @@
 #include "tests/support/hidden_files.h"
 #include "tests/support/hidden_world.h"
 
-/// An arm of the second simulation whose links weigh, whatever its files say.
+/// An arm of the second simulation with heavy links, whatever its files state.
 namespace trammel::test {
 
 struct HeavyArmSpec {
@@ -31,7 +31,7 @@ struct HeavyArm {
 [[nodiscard]] MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed,
                                         int payload = -1);
 
-/// The same at poses of the caller's. What `world.effects` hide acts in both.
+/// The same measurements at the caller's poses. Effects hidden by `world.effects` act in both.
 [[nodiscard]] MeasurementBatch measured_at(const HeavyArm& arm,
                                            std::vector<hidden::MeasuringPose> poses,
                                            std::uint64_t seed);

@@ -12,8 +12,8 @@
 
 namespace trammel::test {
 
-/// Stands between servers and a PostgreSQL, and keeps to itself that a change was committed: as if
-/// whoever made it died between the commit and its answer.
+/// Sits between servers and a PostgreSQL, and withholds the confirmation of a commit, as if the
+/// server died between the commit and its answer.
 class HeldAnswer {
  public:
   /// `url`: of a database that is reached by a socket in a folder.
@@ -22,9 +22,9 @@ class HeldAnswer {
   HeldAnswer(const HeldAnswer&) = delete;
   HeldAnswer& operator=(const HeldAnswer&) = delete;
 
-  /// The same database, through this.
+  /// The URL of the same database through this object.
   [[nodiscard]] const std::string& url() const { return url_; }
-  /// The next transaction that sends `statement` is committed, and nobody is told.
+  /// Lets the next transaction with `statement` be committed without an answer to its client.
   void hold(const std::string& statement);
   /// Until one is: the process that waits for its answer; 0: `limit` is over first.
   [[nodiscard]] pid_t held(std::chrono::milliseconds limit);

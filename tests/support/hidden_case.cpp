@@ -60,8 +60,8 @@ struct Draft {
   bool permuted = false;
 };
 
-/// Causes that mixtures are drawn from: those that a cell with all three usual sources can have at
-/// scattered poses. Not a drift, of which a moved tracker makes three quarters.
+/// Causes for mixtures: those that a cell with all three usual sources can have at scattered poses.
+/// A drift is excluded, since a moved tracker makes three quarters of its effect.
 const std::vector<std::string> kMixable = {
     "payload",         "tool",          "gear_transmission", "encoder_eccentricity",
     "joint_map",       "backlash",      "wrist_coupling",    "link_bending",
@@ -78,7 +78,7 @@ std::vector<std::string> draw_mixture(int count, Random& random) {
   return names;
 }
 
-/// Finds the effects that a kind means, and what is asked.
+/// Finds the effects and the question of a kind.
 void understand(Draft& draft) {
   const std::string& kind = draft.spec.kind;
   draft.truth.kind = kind;
@@ -111,7 +111,7 @@ void understand(Draft& draft) {
   }
 }
 
-/// Sets what the cell models already, and how it is measured, so that the effects can be told.
+/// Sets the sources of the cell and the measurement, so that the effects can be seen.
 void arrange(Draft& draft) {
   const auto has = [&](const std::string& name) { return contains(draft.names, name); };
   World& world = draft.world;
@@ -135,7 +135,7 @@ void arrange(Draft& draft) {
   if (has("replica_p28")) world.orientation = false;
 }
 
-/// Errors of an arm as robots have them, of those groups that the cell identifies.
+/// Realistic errors of an arm, in the groups that the cell identifies.
 VectorXd draw_arm_errors(const std::vector<std::string>& sources, Random& random) {
   constexpr double kGive[kJoints] = {1e-10, 2.8e-10, 1.5e-9, 2e-9, 2.8e-9, 2.8e-9};  // rad/Nmm
   const auto& all = arm_parameters();
@@ -175,7 +175,7 @@ Effect one_parameter(const HiddenCause& cause, Index which, double size, const S
   return made;
 }
 
-/// A tool that is off where the last link could be, or that link.
+/// A tool error that the last link could also have, or that link's error.
 Effect tool_or_link(const Scene& scene, Random& random) {
   struct Pair {
     const char* link;
@@ -279,7 +279,8 @@ void draw_effects(Draft& draft) {
   }
 }
 
-/// Columns of length one thousand sigma, so that all that are not zero count as directions.
+/// Columns scaled to a length of one thousand sigma, so that all that are not zero count as
+/// directions.
 MatrixXd lengthened(MatrixXd columns) {
   for (Index k = 0; k < columns.cols(); ++k)
     columns.col(k) *= 1e3 / std::max(columns.col(k).norm(), 1e-300);
@@ -334,8 +335,8 @@ void set_sizes(Draft& draft) {
   }
 }
 
-/// Rows around the one at which an effect begins between which it makes a difference of less
-/// than 5.5 sigma: noise takes a beginning that far in 1 case of 170.
+/// The range of rows about a beginning within which a shift makes a difference of less than 5.5
+/// sigma: noise moves a beginning that far in 1 case of 170.
 std::pair<int, int> beginnings(const World& world, const Effect& effect, const Frames& still) {
   constexpr double kUnnoticed = 30;
   if (effect.cause.first < 0) return {-1, -1};
@@ -393,7 +394,7 @@ double heavy_factor(Random& random) {
 }
 
 void add_noise(const World& world, const std::string& noise, Frames& frames, Random& random) {
-  constexpr double kLasting = 0.6;  // of one measurement's error is left in the next
+  constexpr double kLasting = 0.6;  // share of one measurement's error that stays in the next
   Vector3d shift_before = Vector3d::Zero();
   Vector3d turn_before = Vector3d::Zero();
   for (Matrix4d& frame : frames) {

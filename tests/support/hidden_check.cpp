@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 constexpr int kWorkingPoses = 300;
 
-/// The factor by which one reading's noise exceeds the usual: 1, or so that each coordinate has
+/// The ratio of one reading's noise to the usual: 1, or random such that each coordinate has
 /// Student's t of variance 1.
 double disturbance(const RobotSpec& spec, Random& random) {
   const auto freedom = static_cast<int>(spec.tail_freedom);

@@ -5,8 +5,7 @@
 
 namespace trammel::hidden {
 
-/// A batch's text as if these columns had not been recorded: each word stands for all columns that
-/// begin with it.
+/// A batch's text without these columns: each word means all columns that begin with it.
 [[nodiscard]] std::string without_columns(const std::string& csv,
                                           const std::vector<std::string>& beginnings);
 

@@ -164,7 +164,7 @@ double best_single_order(const VectorXd& q, const VectorXd& values) {
   return best;
 }
 
-/// Many orders at once, none of which stands out at these poses.
+/// Many orders at once, of which none is prominent at these poses.
 Effect joint_map(const HiddenCause& cause, const Scene& scene, Random& random) {
   constexpr int kHighest = 12;
   constexpr double kStandsOut = 0.5;
@@ -277,8 +277,8 @@ Effect outlier(const HiddenCause& cause, const Scene&, Random& random) {
                 });
 }
 
-/// The course of something slow, 0 to 1 at most, by the share of the batch's time: it warms up
-/// and settles, or goes with the day and comes back.
+/// The course of a slow effect, from 0 to at most 1, by the share of the batch's time: it warms up
+/// and settles, or follows the day and returns.
 std::function<double(double)> draw_course(Random& random) {
   if (whole(random, 0, 1) == 1) {
     const double lag = uniform(random, 0.15, 0.6);
@@ -307,7 +307,7 @@ Effect slow_zero(const HiddenCause& cause, const Scene& scene, Random& random) {
                                                Moment& m) { m.q(j) += v(0) * course(p); });
 }
 
-/// The zero of a joint wanders: as much again at every pose, to either side.
+/// The zero of a joint wanders by a random step at every pose, to either side.
 Effect slow_walk(const HiddenCause& cause, const Scene& scene, Random& random) {
   const Index j = cause.depends_on.front().at(1) - '1';
   std::vector<double> way = {0};
@@ -381,8 +381,8 @@ Effect self_weight(const HiddenCause& cause, const Scene&, Random& random) {
                 });
 }
 
-/// A bar or belt of a joint that is not as long as it should be: it is off by the angle of the
-/// joint before it, and by that between the two.
+/// A bar or belt of a joint with a wrong length: the error depends on the angle of the joint before
+/// it, and on the angle between the two.
 Effect joint_coupling(const HiddenCause& cause, const Scene&, Random& random) {
   const double rate = uniform(random, 0.5, 1), phase = uniform(random, 0, kTurn),
                other = uniform(random, 0, kTurn);
@@ -394,7 +394,7 @@ Effect joint_coupling(const HiddenCause& cause, const Scene&, Random& random) {
                 });
 }
 
-/// The joints of the pose before; of the first one its own.
+/// The joints of the previous pose; for the first pose its own.
 Joints come_from(const std::vector<MeasuringPose>& poses, const MeasuringPose& p) {
   const auto i =
       static_cast<std::size_t>(std::clamp<int>(p.index, 0, static_cast<int>(poses.size()) - 1));
@@ -466,7 +466,7 @@ Effect cracked_link(Random& random) {
                 });
 }
 
-/// A spindle in a soft mount: it sags by how it stands to gravity.
+/// A spindle in a soft mount: its sag depends on its attitude to gravity.
 Effect soft_mount(Random& random) {
   const Vector3d softness(uniform(random, 0.3, 1), uniform(random, 0.3, 1),
                           uniform(random, 0.1, 0.3));
@@ -560,7 +560,7 @@ const std::map<std::string, Maker>& makers() {
   return all;
 }
 
-/// Parameters of the arm's table that nothing but themselves makes: not the base, not the tool.
+/// Parameters of the arm's table without imitators among base and tool.
 const std::vector<std::string> kOwnGeometry = {
     "a1", "alpha1", "q2", "a2", "alpha2", "beta2", "q3", "d3",
     "a3", "alpha3", "q4", "d4", "alpha4", "q5",    "d5", "alpha5"};
@@ -598,9 +598,9 @@ HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& rand
     cause.joint = whole(random, 1, 5);
   } else if (name == "joint_coupling") {
     cause.joint = whole(
-        random, 3, 4);  // joint 2 is not driven past joint 1; of the wrist it is a wrist coupling
+        random, 3, 4);  // joint 2 is not driven past joint 1; on the wrist it is a wrist coupling
   } else if (name == "joint_slip") {
-    cause.joint = whole(random, 2, 5);  // of joint 6 it looks like a tool that turned
+    cause.joint = whole(random, 2, 5);  // on joint 6 it looks like a turned tool
   } else if (name == "link_bending") {
     cause.joint = whole(random, 0, 1) == 0 ? 2 : 4;
   } else if (name == "compliance") {

@@ -8,12 +8,12 @@
 
 namespace trammel::hidden {
 
-/// What was hidden, in the words in which it is to be named.
+/// A hidden cause, in the words of its name.
 struct HiddenCause {
   std::string cause;      ///< `gear_transmission`; `unknown` for a function that no cause makes
   int joint = 0;          ///< 1-based; 0 where it concerns the whole arm
   std::string parameter;  ///< `C3`, `a2`
-  int first = -1;         ///< row from which it acts, or that is out; -1 elsewhere
+  int first = -1;         ///< the first row of the effect, or the outlier; -1 elsewhere
   std::vector<std::string> depends_on;  ///< of `unknown`: `q4`
   double order = 0;                     ///< of a gear, cycles a turn; 0: drawn
 };
@@ -27,17 +27,16 @@ struct Moment {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< mm, of the reading alone
 };
 
-/// One effect: what it does with given numbers. Shapes differ a little from what a calibration
-/// would assume.
+/// One effect: its action for given numbers. Shapes differ a little from those of the calibration.
 struct Effect {
   HiddenCause cause;
   std::vector<std::string> names;  ///< of the values
   Eigen::VectorXd values;
-  std::vector<bool> grows;  ///< which values are the effect's size, zero where there is none
+  std::vector<bool> grows;  ///< true for values that give the effect's size and are zero without it
   std::function<void(const MeasuringPose&, const Eigen::VectorXd&, Moment&)> act;
 };
 
-/// What effects must know of the scene they act in.
+/// The properties of the scene that effects need.
 struct Scene {
   Arm arm;  ///< true, with the first tool and load
   const std::vector<MeasuringPose>* poses = nullptr;
@@ -52,16 +51,13 @@ struct Scene {
 [[nodiscard]] HiddenCause draw_cause(const std::string& cause, const Scene& scene, Random& random);
 /// `cause` with its numbers and shape drawn, of a size as robots show it.
 [[nodiscard]] Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random);
-/// What moves slowly with time: the zero of a joint (`slow_zero`; `slow_walk`: at random), the
-/// stand of the tracker
-/// (`slow_stand`) or the lengths of all links (`slow_growth`).
+/// A slow change with time: the zero of a joint (`slow_zero`; `slow_walk`: at random), the place of
+/// the tracker (`slow_stand`) or the lengths of all links (`slow_growth`).
 [[nodiscard]] Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& random);
-/// What has another form than any cause, and is near to some: a joint that is off by a wave of two
-/// joints
-/// (`foreign_wave`), a floor with a seam (`foreign_seam`), a cracked link (`foreign_crack`), a
-/// spindle in a soft mount
-/// (`foreign_mount`), zeros that all walk at random (`foreign_walks`), a load that is another one
-/// at every third pose or so (`foreign_loads`).
+/// An effect of another form than any cause, and near to some: a joint error that is a wave of two
+/// joints (`foreign_wave`), a floor with a seam (`foreign_seam`), a cracked link (`foreign_crack`),
+/// a spindle in a soft mount (`foreign_mount`), zeros that all walk at random (`foreign_walks`), a
+/// load that changes at about every third pose (`foreign_loads`).
 [[nodiscard]] Effect draw_foreign_effect(const std::string& kind, const Scene& scene,
                                          Random& random);
 

@@ -5,14 +5,14 @@
 
 #include "tests/support/hidden_world.h"
 
-/// The three files that describe a hidden case to whoever has to find what is hidden.
+/// The three files of a hidden case for the program under test.
 namespace trammel::hidden {
 
-/// What the cell file believes of tools and loads.
+/// The tools and loads as the cell file states them.
 struct Belief {
   std::vector<Eigen::Matrix4d> tools;
   std::vector<Load> loads;
-  bool knows_stand = false;  ///< where the tracker stands
+  bool knows_stand = false;  ///< the file states the tracker's place
 };
 
 /// The arm as drawn.

@@ -40,7 +40,7 @@ MatrixXd rival_columns(const World& world, const HiddenCause& cause,
   return effect_columns(world, poses, draw_effect(cause, scene_of(world), random));
 }
 
-/// Causes that always act, and those that begin at a pose, as they would act from the first one on.
+/// The causes as they would act if those that begin at a pose acted from the first one on.
 std::vector<HiddenCause> steady_causes(const World& world) {
   std::vector<HiddenCause> causes = {{"wrist_coupling", 0, "", -1, {}},
                                      {"thermal_growth", 0, "", -1, {}},
@@ -69,7 +69,7 @@ std::vector<HiddenCause> sudden_causes() {
   return causes;
 }
 
-/// Share of `effect` that `columns` cannot make beside `nuisance`, which both are outside of.
+/// Share of `effect` that `columns` cannot explain. Both are without their parts along `nuisance`.
 double share_left(const VectorXd& effect, const MatrixXd& columns) {
   const MatrixXd directions = directions_of(of_length(columns, 1e4));
   return outside(directions, effect).squaredNorm() / effect.squaredNorm();
@@ -99,7 +99,7 @@ double held_out_rms_mm(const HiddenCase& hidden) {
     MatrixXd all = arm_columns(world, poses);
     for (const Effect& effect : world.effects) {
       MatrixXd more = effect_columns(world, poses, effect);
-      for (Index k = 0; k < more.cols(); ++k) {  // by as much as the effect is large
+      for (Index k = 0; k < more.cols(); ++k) {  // by the size of the effect
         if (effect.grows[static_cast<std::size_t>(k)]) more.col(k) *= effect.values.norm();
       }
       all = side_by_side(all, more);

@@ -17,8 +17,8 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSecondsAPose = 20;
 constexpr double kSecondsAPathPoint = 0.4;
 constexpr double kLinkLag =
-    1.0 / 40;                     // of the time measured, that the links follow the thermometer by
-constexpr int kTurnsOfAKind = 8;  // how often a tool or a load is put on again
+    1.0 / 40;  // share of the measuring time, the lag of the links behind the thermometer
+constexpr int kTurnsOfAKind = 8;  // changes of a tool or a load
 
 using Ranges = std::array<std::pair<double, double>, kJoints>;
 
@@ -53,8 +53,8 @@ void scatter(std::vector<MeasuringPose>& poses, const Ranges& ranges, Random& ra
   }
 }
 
-/// One continuous motion: every joint swings to and fro within its range, each at its own pace,
-/// slowly enough that it moves by less than 0.2 rad from point to point.
+/// One continuous motion: every joint swings within its range at its own pace, by less than 0.2 rad
+/// from point to point.
 void follow_path(std::vector<MeasuringPose>& poses, const Ranges& ranges, Random& random) {
   for (std::size_t j = 0; j < kJoints; ++j) {
     const auto [lower, upper] = ranges[j];

@@ -17,13 +17,13 @@ using Random = std::mt19937_64;
 /// From `from` to `to`, both included.
 [[nodiscard]] int whole(Random& random, int from, int to);
 
-/// One moment at which the arm is measured, with all that may matter to where the tool is.
+/// One moment of a measurement, with all quantities that affect the tool's place.
 struct MeasuringPose {
   int index = 0;
   Joints q = Joints::Zero();
   Joints velocity = Joints::Zero();  ///< rad/s
   double time_s = 0;
-  double temperature_c = 20;       ///< as the thermometer says
+  double temperature_c = 20;       ///< by the thermometer
   double link_temperature_c = 20;  ///< of the links, which follow
   std::array<int, kJoints> direction = {};
   int tool = 0;

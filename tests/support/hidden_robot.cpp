@@ -52,7 +52,7 @@ struct Deflection {
   Deflection() { bends.fill(Matrix4d::Identity()); }
 };
 
-/// frames[0] is the base, frames[i] what follows link i.
+/// frames[0] is the base, frames[i] the frame behind link i.
 std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q,
                                             const Deflection& deflection) {
   std::array<Matrix4d, kJoints + 1> frames;
@@ -85,8 +85,8 @@ std::vector<Weight> weights_in(const std::array<Matrix4d, kJoints + 1>& frames, 
   return all;
 }
 
-/// Torque of a spring whose pins are at (fixed, 0) and, turned by the angle, at (moving, 0): from
-/// the length between.
+/// Torque of a spring whose pins are at (fixed, 0) and, turned by the angle, at (moving, 0):
+/// computed from the length between the pins.
 double torque_of(const Spring& spring, double q) {
   if (spring.fixed_mm == 0) return 0;
   const double angle = q + spring.phase;
@@ -136,8 +136,8 @@ Matrix4d bend_of(double flex, const Matrix4d& start, const Matrix4d& end, const 
   const Vector3d across = pull - along * along.dot(pull);
   const Vector3d turning = (to_end * (cog - origin(end))).cross(pull);
   const Vector3d moment = turning - along * along.dot(turning);
-  // Flexibility 1.15 at the far end, 0.85 at the joint: integrals of it times 1, s, s2, s the way
-  // from the far end.
+  // The flexibility is 1.15 at the far end and 0.85 at the joint. These are its integrals times 1,
+  // s, s2, where s is the distance from the far end.
   const double zeroth = flex * length;
   const double first = flex * length * length * (1.15 / 2 - 0.3 / 3);
   const double second = flex * length * length * length * (1.15 / 3 - 0.3 / 4);

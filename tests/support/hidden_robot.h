@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-/// A second, small simulation of a robot arm, for tests that hide an effect and ask for it. It
-/// shares nothing with the server: own kinematics, own load, own deflection. Lengths in mm, angles
-/// in rad, masses in kg, forces in N, joints counted from 0.
+/// A second, small simulation of a robot arm, for tests that hide an effect and search for it. It
+/// shares no code with the server: it has its own kinematics, load and deflection. Lengths in mm,
+/// angles in rad, masses in kg, forces in N, joints counted from 0.
 namespace trammel::hidden {
 
 constexpr int kJoints = 6;
@@ -28,22 +28,22 @@ struct Load {
 /// A gas spring or balancer at a joint: it pulls a pin on the link that follows towards a pin on
 /// the link before.
 struct Spring {
-  double force_N = 0;         ///< where its pins are `rest_mm` apart
-  double stiffness_N_mm = 0;  ///< what it pulls more a mm beyond
+  double force_N = 0;         ///< with its pins `rest_mm` apart
+  double stiffness_N_mm = 0;  ///< additional pull per mm beyond
   double rest_mm = 0;
   double fixed_mm = 0;   ///< from the axis to the pin that stays
   double moving_mm = 0;  ///< from the axis to the pin that moves
   double phase = 0;      ///< rad, between the pins at joint angle 0
 };
 
-/// A frame for each joint, none of which moves anything.
+/// A frame for each joint, all without motion.
 [[nodiscard]] inline std::array<Eigen::Matrix4d, kJoints> still() {
   std::array<Eigen::Matrix4d, kJoints> frames;
   frames.fill(Eigen::Matrix4d::Identity());
   return frames;
 }
 
-/// Where the tracker stands, in the world.
+/// The place of the tracker, in the world.
 [[nodiscard]] inline Eigen::Vector3d tracker_stand_mm() { return {4200, -1800, 1300}; }
 
 /// Everything that decides where the tool stands.
@@ -51,10 +51,11 @@ struct Arm {
   std::array<Link, kJoints> links;
   Eigen::Matrix4d base = Eigen::Matrix4d::Identity();       ///< world from base
   Eigen::Matrix4d tool = Eigen::Matrix4d::Identity();       ///< flange from tool
-  std::array<Eigen::Matrix4d, kJoints> bearings = still();  ///< how each axis stands in its bearing
+  std::array<Eigen::Matrix4d, kJoints> bearings = still();  ///< the place of each axis in its
+                                                            ///< bearing
   Load load;
   Joints give = Joints::Zero();            ///< rad/Nmm, of each gearbox
-  std::array<Load, kJoints> weights = {};  ///< of the links, in the frame that follows each
+  std::array<Load, kJoints> weights = {};  ///< of the links, each in the frame behind its link
   Spring spring;                           ///< at joint 2
   Eigen::Vector2d foot = {0, 0};           ///< rad/Nmm, how the base tilts about its x and y axes
   std::array<double, kJoints> flex = {};   ///< 1/(N mm2), 1/EI of each link in its middle; 0: rigid
@@ -72,8 +73,8 @@ struct Arm {
 /// World from tool, gearboxes and links having given way until moments and deflections agree.
 [[nodiscard]] Eigen::Matrix4d tool_frame(const Arm& arm, const Joints& q);
 
-/// What a calibration could change of the arm, as one vector: `x0`..`alpha0`, `q1`..`alpha6`,
-/// `C1`..`C6`.
+/// The arm parameters that a calibration could change, as one vector: `x0`..`alpha0`,
+/// `q1`..`alpha6`, `C1`..`C6`.
 struct ArmParameter {
   std::string name;
   std::string group;  ///< base, geometry, compliance

@@ -35,7 +35,7 @@ Matrix4d frame_at(const World& world, const MeasuringPose& pose,
   return frame;
 }
 
-/// Central difference: what a change of `steps` up does more than one down, a unit.
+/// Central difference per unit: the effect of `steps` up minus that of `steps` down.
 template <typename FramesAt>
 VectorXd central(const World& world, double steps, FramesAt frames_of) {
   return whitened(world, frames_of(1.0), frames_of(-1.0)) / (2 * steps);

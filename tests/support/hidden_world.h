@@ -7,12 +7,13 @@
 
 namespace trammel::hidden {
 
-/// A cell as it really is, and what is measured in it.
+/// A cell as it really is, and its measurements.
 struct World {
   Arm arm;  ///< true; tool and load are put on pose by pose
   std::vector<Eigen::Matrix4d> tools;
   std::vector<Load> loads;
-  std::vector<std::string> sources;  ///< what the cell file tells the calibration to identify
+  std::vector<std::string> sources;  ///< the sources that the cell file tells the calibration to
+                                     ///< identify
   std::vector<MeasuringPose> poses;
   std::vector<Effect> effects;
   bool orientation = true;
@@ -25,15 +26,15 @@ using Frames = std::vector<Eigen::Matrix4d>;
 [[nodiscard]] Frames frames_at(const World& world, const std::vector<MeasuringPose>& poses,
                                const std::vector<Effect>& effects);
 
-/// Rows for all of what a pose shows (three, or six with orientation), over the tracker's sigma:
+/// Rows for all numbers of a pose (three, or six with orientation), over the tracker's sigma:
 /// `moved` minus `still`.
 [[nodiscard]] Eigen::VectorXd whitened(const World& world, const Frames& moved,
                                        const Frames& still);
-/// Likewise, by finite differences: what the cell's error sources can do, one column each, in units
-/// that they may reasonably be off by.
+/// Likewise by finite differences: the effects of the cell's error sources, one column each, in
+/// units of their reasonable uncertainties.
 [[nodiscard]] Eigen::MatrixXd arm_columns(const World& world,
                                           const std::vector<MeasuringPose>& poses);
-/// What `effect` can do: derivatives by its values, in units of its size.
+/// The directions of `effect`: derivatives by its values, in units of its size.
 [[nodiscard]] Eigen::MatrixXd effect_columns(const World& world,
                                              const std::vector<MeasuringPose>& poses,
                                              const Effect& effect);
@@ -41,7 +42,7 @@ using Frames = std::vector<Eigen::Matrix4d>;
 /// Orthonormal directions that `columns` can make: singular values of 1 (one sigma for a reasonable
 /// change) and above.
 [[nodiscard]] Eigen::MatrixXd directions_of(const Eigen::MatrixXd& columns);
-/// `rows` without what lies along `directions`.
+/// `rows` without their parts along `directions`.
 [[nodiscard]] Eigen::MatrixXd outside(const Eigen::MatrixXd& directions,
                                       const Eigen::MatrixXd& rows);
 

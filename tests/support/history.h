@@ -8,11 +8,11 @@
 
 #include "server/base/result.h"
 
-/// What clients asked and were answered, for tests/faults/history/history_check.py: a JSON object a
-/// line.
+/// Requests of clients and their answers, for tests/faults/history/history_check.py: a JSON object
+/// per line.
 namespace trammel::test {
 
-/// Microseconds by a clock that all processes of this host have.
+/// Microseconds of a clock common to all processes of this host.
 [[nodiscard]] std::int64_t monotonic_us();
 
 /// Thread-safe.
@@ -22,9 +22,9 @@ class History {
 
   void add(const nlohmann::json& record);
 
-  /// Calls `call`, whose Result<nlohmann::json> holds what the record is to have besides, and adds
-  /// the record with when that was and how it was answered. Returns the answer: `ok`, `conflict`,
-  /// `not_found`, `refused`, or `unknown` where it may have been made or not.
+  /// Calls `call`, whose Result<nlohmann::json> has additional members for the record, and adds the
+  /// record with its times and the answer. Returns the answer: `ok`, `conflict`, `not_found`,
+  /// `refused`, or `unknown` if the change may or may not have been made.
   template <typename Call>
   std::string ask(nlohmann::json record, const Call& call) {
     record["invoke"] = monotonic_us();

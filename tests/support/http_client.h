@@ -16,12 +16,12 @@ struct HttpAnswer {
 /// GET of `path` from 127.0.0.1.
 [[nodiscard]] HttpAnswer http_get(std::uint16_t port, const std::string& path,
                                   std::chrono::milliseconds limit = std::chrono::seconds(30));
-/// What comes back for these bytes until the other side closes or the limit is over.
+/// The reply to these bytes until the other side closes or the limit is over.
 [[nodiscard]] std::string http_exchange(std::uint16_t port, const std::string& bytes,
                                         std::chrono::milliseconds limit = std::chrono::seconds(30));
 [[nodiscard]] HttpAnswer parse_http(const std::string& bytes);
 
-/// A connection that is open for as long as this lives.
+/// A connection that stays open during the object's life.
 class OpenConnection {
  public:
   explicit OpenConnection(std::uint16_t port);
@@ -31,7 +31,7 @@ class OpenConnection {
   void send(const std::string& bytes) const;
   /// Until the other side closes or the limit is over.
   [[nodiscard]] std::string read(std::chrono::milliseconds limit) const;
-  /// Whether the other side has closed by then.
+  /// True if the other side closes within the limit.
   [[nodiscard]] bool closes_within(std::chrono::milliseconds limit) const;
 
  private:

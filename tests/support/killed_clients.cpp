@@ -120,7 +120,7 @@ KillOutcome kill_clients(const KillLoad& load) {
   int ends[2];
   if (::pipe(ends) != 0) return outcome;
   const pid_t idle = fork_child([&] {
-    ::close(ends[1]);  // whose end is the end of the killing
+    ::close(ends[1]);  // it then closes when the killer ends
     be_idle(load.server, load.idle);
   });
   const pid_t killer = fork_child([&] { kill_one_after_another(load, ends[1]); });

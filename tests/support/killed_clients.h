@@ -17,11 +17,11 @@ struct KillLoad {
 struct KillOutcome {
   int killed = 0;
   std::size_t calls = 0;      ///< of the honest clients
-  std::size_t lost = 0;       ///< of them without an answer
-  double longest_call_s = 0;  ///< of the honest clients, a lost one included
+  std::size_t lost = 0;       ///< those of them without an answer
+  double longest_call_s = 0;  ///< of the honest clients, including lost calls
 };
 
-/// Kills clients (-9) while they connect and call, others being connected. The clients are forked
+/// Kills clients (-9) while they connect and call and others are connected. The clients are forked
 /// from this process, which has no participant yet.
 [[nodiscard]] KillOutcome kill_clients(const KillLoad& load);
 

@@ -310,8 +310,8 @@ void add_losses(const std::vector<Fleet::Loss>& losses, const std::string& histo
   }
 }
 
-/// Adds what the record says that nobody asked for: models, and what was put in quarantine. Not
-/// before the second that the trail says.
+/// Adds changes in the record that no client requested: models, and quarantines. They are not
+/// before the second in the trail.
 void add_inner_changes(const Fleet& fleet, History& history) {
   const auto since_unix = std::chrono::system_clock::now().time_since_epoch();
   const std::int64_t offset =
@@ -376,7 +376,7 @@ bool wait_until(const std::function<bool()>& holds, seconds limit) {
   return true;
 }
 
-/// The number of servers that do not serve in the end what is in force, though they had time.
+/// The number of servers that at the end do not serve the version in force, though they had time.
 int served_otherwise(const Fleet& fleet) {
   int others = 0;
   for (std::size_t i = 0; i < kServing; ++i) {
@@ -455,7 +455,7 @@ void train_first(const Fleet& fleet, History& history) {
   }
 }
 
-/// Adds the time that jobs of a cell waited since then (Unix time, s) though nobody worked for it.
+/// Adds the time since then (Unix time, s) that jobs of a cell waited while nobody worked for it.
 void add_idle_times(const Fleet& fleet, std::int64_t since, KilledFleetOutcome& outcome) {
   const auto rows = fleet.rows(fmt::format(
       "WITH gaps AS (SELECT cell, started_at - GREATEST(created_at, {0}, COALESCE(MAX(finished_at) "
@@ -513,7 +513,7 @@ KilledFleetOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
     for (int i = 0; i < 2; ++i)
       predictors.emplace_back(
           options_for({&fleet.server(0), &fleet.server(1)}, kPredictionPatience), history);
-    pass(seconds(2));  // they have found their servers
+    pass(seconds(2));  // so that they find their servers
     static_cast<void>(times_of(predictors));
     pass(plan.quiet);
     outcome.p99_quiet_ms = p99(times_of(predictors).ms);
@@ -521,7 +521,7 @@ KilledFleetOutcome kill_a_fleet(const KillPlan& plan, const std::string& path) {
     pass(plan.quiet);
     outcome.p99_load_ms = p99(times_of(predictors).ms);
     fleet.kill(plan.kills, plan.longest_pause);
-    pass(seconds(2));  // what was killed last is felt, too
+    pass(seconds(2));  // so that the last kill has an effect, too
     const Predictor::Times times = times_of(predictors);
     load.stop();
     outcome.p99_kills_ms = p99(times.ms);

@@ -11,8 +11,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
 
-/// A cell that is measured again and again: the trainer with a store of its own, and the robot that
-/// it never sees.
+/// A cell that is measured repeatedly: a trainer with its own store, and a robot that it never
+/// sees.
 namespace trammel::test {
 
 class LearningCell {
@@ -42,16 +42,16 @@ class LearningCell {
   ServedModelPtr asked_;                          // the last version that was asked for
 };
 
-/// m, rms over the cell's joint ranges of what the model gets wrong of the robot without noise,
-/// with the best shift and turn of the whole arm taken off.
+/// m, rms over the cell's joint ranges of the model's error for the robot without noise, after the
+/// best shift and turn of the whole arm.
 [[nodiscard]] double true_error(const CompensatedModel& model, const VirtualRobot& robot,
                                 const std::string& tool = {});
 
-/// What measuring is like that day.
+/// The conditions of measuring on that day.
 struct Day {
   int poses = 200;
   std::uint64_t seed = 1;
-  double noise = 1;  ///< times that of the cell's tracker
+  double noise = 1;  ///< factor on that of the cell's tracker
   double corner =
       1;  ///< share of each joint's range that is measured, about a place drawn with the seed
   bool set_up_anew =

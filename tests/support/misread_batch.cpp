@@ -16,7 +16,7 @@ namespace {
 using Random = std::mt19937_64;
 using Quaternion = Eigen::Quaterniond;
 
-// Those of six joints that turn come first.
+// Robots with six turning joints come first.
 const std::vector<std::string> kRobots = {"abb_irb6640-205-275",  "abb_irb120-3-06",
                                           "abb_irb1200-5-09",     "fanuc_m-20ia",
                                           "yaskawa_gp25",         "kuka_kr210-r2700-extra",

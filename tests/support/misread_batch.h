@@ -13,7 +13,7 @@
 /// with.
 namespace trammel::test {
 
-/// How a new cell is measured for the first time.
+/// The first measurement of a new cell.
 struct FirstBatch {
   std::string robot = "abb_irb6640-205-275";  ///< of models/
   bool base_known = true, tool_known = true;
@@ -27,19 +27,19 @@ struct FirstBatch {
       5e-10;             ///< rad/Nmm, standard deviation of every joint's, under the load of 100 kg
   double noise = 30e-6;  ///< m, of one coordinate
   double outliers = 0;   ///< share of the rows, each off by up to 0.3 m
-  double tracker = 2;  ///< m, how far off the drawn base the tracker may stand; it is turned about
-                       ///< the vertical, too
+  double tracker = 2;    ///< m, largest distance of the tracker from the drawn base; it is turned
+                         ///< about the vertical, too
   std::uint64_t seed = 1;
 };
-/// One of them, drawn: 15 to 300 poses, positions alone or full poses, what is known of base and
-/// tool, errors up to some mm and degrees, noise to 0.2 mm, outliers.
+/// Draws a robot and a batch: 15 to 300 poses, positions alone or full poses, a base and tool that
+/// are known or not, errors up to some mm and degrees, noise to 0.2 mm, outliers.
 enum class Robots { kOfSixJoints, kAll };
 [[nodiscard]] FirstBatch first_batch(std::uint64_t seed, Robots robots);
 [[nodiscard]] std::shared_ptr<const Cell> new_cell(const FirstBatch& first);
 /// The batch as it came, not yet checked.
 [[nodiscard]] MeasurementBatch measured_first(const FirstBatch& first, const Cell& cell);
 
-/// A mistake in a file. `make` makes it and says how the reading that was meant is named.
+/// A mistake in a file. `make` makes it and returns the name of the intended reading.
 struct Misreading {
   std::string kind;
   bool needs_orientation = false;
@@ -48,10 +48,10 @@ struct Misreading {
 };
 [[nodiscard]] const std::vector<Misreading>& misreadings();
 
-/// What is said of a batch before anything is learned from it: by check_against_cell(), else by
+/// The refusal of a batch before anything is learned from it: by check_against_cell(), else by
 /// batch_doubt(); empty: it is learned from.
 [[nodiscard]] std::optional<Error> said_of(MeasurementBatch batch, const Cell& cell);
-/// Whether the error names the reading.
+/// True if the error names the reading.
 [[nodiscard]] bool names(const Error& error, const std::string& reading);
 
 }  // namespace trammel::test

@@ -8,15 +8,15 @@
 
 namespace trammel::test {
 
-/// Sends changed copies of real packets to a participant: of what it sent itself, turned round, and
-/// of what a client sends to join.
+/// Sends changed copies of real packets to a participant: its own packets, sent back, and those
+/// that a client sends to join.
 class MutatedPackets {
  public:
   MutatedPackets(std::uint16_t port, std::uint32_t domain, unsigned seed);
 
-  /// Joins, and collects what the other one sends meanwhile. False when it does not answer.
+  /// Joins, and collects the packets of the other one meanwhile. False if it does not answer.
   [[nodiscard]] bool collect();
-  /// So many packets; after each 500 it waits until what was sent has been read.
+  /// Sends that many packets; after each 500 it waits until they have been read.
   void send(std::size_t packets);
 
  private:

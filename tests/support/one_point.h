@@ -7,7 +7,7 @@
 #include "server/measurement/measurement.h"
 #include "server/robot/cell.h"
 
-/// A campaign in which the tool's tip is brought to one point from all sides, and measured there.
+/// A campaign that brings the tool's tip to one point from all sides and measures it there.
 namespace trammel::test {
 
 /// A UR5; `base` and `tool` as the cell file has them, `model` likewise.

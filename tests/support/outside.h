@@ -7,7 +7,7 @@
 #include "server/simulate/simulate.h"
 #include "server/tasks/train/train.h"
 
-/// How honest a model is beyond the poses it was trained on.
+/// How well a model states its errors beyond its training poses.
 namespace trammel::test {
 
 /// Poses whose farthest joint is between `from` and `to` of its training range out of range.
@@ -22,8 +22,8 @@ struct OutsideBand {
 
 struct OutsideFigures {
   std::vector<OutsideBand> bands;  ///< the first is within range
-  /// A true outsider is missed by the whole bias by more than three times what it misses training
-  /// poses left out by (rms); an insider lies within the training ranges and is not.
+  /// An outsider is a pose at which the whole bias errs by more than three times the rms of
+  /// left-out training poses. An insider is within the training ranges and not an outsider.
   int outsiders = 0, caught = 0;  ///< caught: not in domain
   int insiders = 0, refused = 0;  ///< refused: not in domain either
 };

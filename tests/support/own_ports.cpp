@@ -16,10 +16,10 @@ namespace {
 
 constexpr int kBlocks = 1500;
 constexpr int kFirstPort = 20000;
-constexpr int kDomains = 48;  // the ports that DDS derives from them end below kFirstPort
+constexpr int kDomains = 48;  // the ports that DDS derives from these domains end below kFirstPort
 
-/// True if this process has the number of that kind now: others see it by an abstract socket, which
-/// the kernel lets go with the process. tests/python/test_trammel.py uses the same names.
+/// True if this process now has the number of that kind. Others see it by an abstract socket, which
+/// the kernel releases with the process. tests/python/test_trammel.py uses the same names.
 bool reserve(const char* kind, int number) {
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
@@ -67,9 +67,9 @@ int block() {
   return mine;
 }
 
-/// In one domain the port of a client that has left may be the next client's, whom a server then
-/// answers that still announces itself to the former one. Where more tests run at once than there
-/// are domains, two share one.
+/// In one domain, the port of a client that has left may become the next client's. A server that
+/// still announces itself to the former client then answers the next one. If more tests run at once
+/// than there are domains, two share one.
 int free_domain() {
   for (int tried = 0; tried < kDomains; ++tried) {
     const int domain = 1 + (block() + tried) % kDomains;

@@ -31,7 +31,7 @@ Patroni::Patroni() {
     why_not_ = "network namespaces cannot be made here: that takes root";
     return;
   }
-  // TERM: it ends what it has started. Killed with this process it could not.
+  // TERM lets it end its children; killed together with this process it could not.
   cluster_.emplace(std::vector<std::string>{"/usr/bin/setpriv", "--pdeathsig=TERM", kScript, "run",
                                             folder_.path().string()});
   if (!cluster_->wait_for_line("ready: ", kPatience)) why_not_ = cluster_->standard_error();

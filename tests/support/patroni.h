@@ -8,9 +8,9 @@
 
 namespace trammel::test {
 
-/// A PostgreSQL of three hosts that fails over by itself, by the files of deploy/patroni. The hosts
-/// are network namespaces, and so is the place of this thread and of all that it starts from now
-/// on. They go with the test.
+/// A PostgreSQL of three hosts with automatic failover, by the files of deploy/patroni. The hosts
+/// are network namespaces, and so is the place of this thread and of all processes that it starts
+/// from now on. They end with the test.
 class Patroni {
  public:
   Patroni();
@@ -22,12 +22,12 @@ class Patroni {
   [[nodiscard]] const std::string& why_not() const { return why_not_; }
   /// A new store that `trammel`, the role of the URL, may use.
   [[nodiscard]] std::string new_store();
-  /// What a statement says to the owner, a line a row; aborts where it fails.
+  /// The result of a statement for the owner, a line per row; aborts if it fails.
   [[nodiscard]] std::string sql(const std::string& statement) const;
   /// The number of the host that takes changes, 1 to 3; 0: none does.
   [[nodiscard]] int primary() const;
-  /// `kill`, `freeze`, `thaw`, `start`: all processes of a host. `cut`, `mute` (nothing leaves it),
-  /// `deaf` (nothing reaches it), `mend`: its line.
+  /// Acts on a host: `kill`, `freeze`, `thaw`, `start` on all of its processes; `cut`, `mute` (it
+  /// cannot send), `deaf` (it cannot receive), `mend` on its line.
   void act(const std::string& what, int host) const;
   /// Until both other hosts follow, and would take over.
   [[nodiscard]] bool wait_until_whole() const;

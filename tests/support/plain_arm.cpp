@@ -28,7 +28,7 @@ Eigen::Isometry3d tip(const PlainArm& arm, const JointVector& q, const Vector3& 
   return X;
 }
 
-/// As far as `q` is from having the tip at `at`: m, and rad at 0.3 m.
+/// The distance from the pose at `q` to the tip at `at`: m, and rad at 0.3 m.
 Eigen::VectorXd away(const PlainArm& arm, const Eigen::Isometry3d& at, const JointVector& q) {
   const Eigen::Isometry3d X = tip(arm, q, plain_tool());
   const Eigen::AngleAxisd turn(at.linear() * X.linear().transpose());

@@ -7,8 +7,8 @@
 
 #include "server/compensate/compensated_model.h"
 
-/// Arms whose lengths are written down here, not read by the project's kinematics, and that are as
-/// drawn but for their zeros.
+/// Arms with lengths that are written here, independent of the project's kinematics. They equal
+/// their drawing except for their zeros.
 namespace trammel::test {
 
 /// m and rad. The second axis of an arm whose second and third axes are parallel has d 0.
@@ -27,7 +27,7 @@ struct PlainArm {
 /// m: the tool's point in the flange, as the model has it.
 [[nodiscard]] Vector3 plain_tool();
 
-/// How the arm is measured, with 0.013 mm and 0.05 mrad of noise an axis.
+/// The measurement of the arm, with 0.013 mm and 0.05 mrad of noise per axis.
 struct PlainCheck {
   std::vector<JointVector> poses;
   JointVector zeros;  ///< rad, by which the joints are off
@@ -41,8 +41,8 @@ struct PlainCheck {
 /// On 100 poses, base and geometry identified.
 [[nodiscard]] CompensatedModel trained(const PlainArm& arm);
 
-/// Elbows of one pose of the flange of an arm of seven axes: the third joint turns from -60 to 60
-/// degrees. `like`: the posture that has it.
+/// Elbow postures for one flange pose of a seven-axis arm: the third joint turns from -60 to 60
+/// degrees. `like`: a posture with that flange pose.
 [[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count,
                                               const JointVector& like);
 [[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count = 14);

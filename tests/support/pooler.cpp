@@ -26,7 +26,7 @@ Pooler::Pooler(const Postgres& server) {
           "{}\n",
           server_folder_, folder_.path().string(), folder_.file("users")));
   std::vector<std::string> command = {"/usr/sbin/pgbouncer", file};
-  if (::geteuid() == 0) {  // it refuses to run as root
+  if (::geteuid() == 0) {  // the pooler refuses to run as root
     static_cast<void>(run({"/bin/chown", "-R", "postgres", folder_.path().string()}));
     command.insert(command.begin(), {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres",
                                      "--init-groups", "--pdeathsig=KILL"});

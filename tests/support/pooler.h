@@ -13,7 +13,7 @@ namespace trammel::test {
 class Pooler {
  public:
   explicit Pooler(const Postgres& server);
-  /// The same database by way of it.
+  /// The URL of the same database through the pooler.
   [[nodiscard]] std::string through(std::string url) const;
 
  private:

@@ -96,7 +96,7 @@ void Postgres::start_until(const std::string& line) {
     command.insert(command.end(), {"-c", "listen_addresses=127.0.0.1", "-c", "ssl=on", "-p",
                                    std::to_string(port_)});
   if (disk_ == Disk::kSmall) {
-    // Mounted for the server alone: it goes with it.
+    // A mount for the server alone, which ends with it.
     constexpr const char* kMounted =
         "set -e; mkdir -p \"$0\"; mount -t tmpfs -o size=64m tmpfs \"$0\"; mkdir \"$0/space\"; "
         "chown -R postgres \"$0\"; head -c 16M /dev/zero >\"$0/ballast\"; exec \"$@\"";
@@ -189,7 +189,7 @@ LockedTable::LockedTable(const std::string& url, const std::string& table, const
 }
 
 LockedTable::~LockedTable() {
-  psql_.signal(SIGINT);  // a server whose client is killed does not see it while it sleeps
+  psql_.signal(SIGINT);  // a server does not notice the end of its client while it sleeps
   static_cast<void>(psql_.wait(kPostgresPatience));
 }
 

@@ -17,8 +17,8 @@ class Postgres {
  public:
   /// Started when it is asked for first.
   static Postgres& of_program();
-  /// kWaitedFor: a commit is on the disk when it is acknowledged. kSmall: it also has a disk of 64
-  /// MB, the tablespace `small` with a ballast of 16 MB.
+  /// kWaitedFor: a commit is on the disk before it is acknowledged. kSmall: additionally a disk of
+  /// 64 MB, the tablespace `small` with a ballast of 16 MB.
   enum class Disk { kOwn, kWaitedFor, kSmall };
   explicit Postgres(Disk disk = Disk::kOwn);
   ~Postgres();
@@ -31,22 +31,21 @@ class Postgres {
   /// Of a database, for a role. The role `needs_password` is let in with one only, `right`.
   [[nodiscard]] std::string url(const std::string& database,
                                 const std::string& role = "postgres") const;
-  /// What a statement says in that database, a line a row; aborts where it fails.
+  /// The result of a statement in that database, a line per row; aborts if it fails.
   std::string sql(const std::string& url, const std::string& statement) const;
-  /// What the clients of that database that connect from now on ask of it is written down.
+  /// Records the statements of clients that connect to that database from now on.
   void write_down(const std::string& url) const;
-  /// What was asked of it since this was called last, a text for each way of a client to the server
-  /// and back.
+  /// The statements since the last call, a text for each round trip of a client.
   [[nodiscard]] std::vector<std::string> asked();
 
-  /// From now on it is at `localhost` on that port, too, with TLS and for who has a certificate of
-  /// his role alone.
+  /// Makes the server listen at `localhost` on that port as well, with TLS and only for clients
+  /// with a certificate of their role.
   void take_certificates(std::uint16_t port);
-  /// By that way, as libpq's most careful: the name and the certificate of the server are compared,
-  /// and the client shows its own. The role `keeper` has one.
+  /// The URL for that way with libpq's strictest checks: the name and the certificate of the server
+  /// are compared, and the client shows its own. The role `keeper` has one.
   [[nodiscard]] std::string certified_url(const std::string& database,
                                           const std::string& role = "keeper") const;
-  /// In this folder: `ca.crt`, `other-ca.crt`, `keeper.crt`, `keeper.key`.
+  /// The folder with `ca.crt`, `other-ca.crt`, `keeper.crt`, `keeper.key`.
   [[nodiscard]] std::string certificates() const { return folder_.file("certificates"); }
 
   void start();
@@ -54,7 +53,7 @@ class Postgres {
   /// SIGKILL for the one that has started all the others, which end by themselves; until none is
   /// left.
   void kill();
-  /// From now on it answers, and takes no change: the standby of nobody.
+  /// Makes it answer and reject changes, as a standby without a primary.
   void become_standby();
   /// Takes the ballast from the small disk.
   void make_room() const;
@@ -70,13 +69,13 @@ class Postgres {
   TemporaryFolder folder_;
   const Disk disk_;
   std::optional<Process> server_;
-  std::uint16_t port_ = 0;  // on which it takes certificates; 0: it takes none
+  std::uint16_t port_ = 0;  // the port for certificates; 0: none
   int databases_ = 0;
   int marks_ = 0;
   std::size_t read_of_log_ = 0;
 };
 
-/// Somebody's psql, which holds a table of that database locked until the end of this.
+/// A foreign psql session that locks a table of that database until this object ends.
 class LockedTable {
  public:
   LockedTable(const std::string& url, const std::string& table, const std::string& mode);

@@ -24,7 +24,7 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   [[nodiscard]] pid_t pid() const { return pid_; }
-  /// What it has written so far; all of it after wait().
+  /// Its output so far; complete after wait().
   [[nodiscard]] std::string standard_output() const;
   [[nodiscard]] std::string standard_error() const;
   /// Until a whole line of either stream contains `part`; false when the streams end or `limit` is

@@ -15,7 +15,8 @@ inline constexpr std::uint32_t kAnnouncerId = 0x000100c2, kPublicationsId = 0x00
 inline constexpr std::uint32_t kAnnouncerReader = 0x000100c7, kPublicationsReader = 0x000003c7,
                                kSubscriptionsReader = 0x000004c7;
 
-/// A participant without any DDS library: one UDP socket, through which a test sends what it likes.
+/// A participant without any DDS library: one UDP socket, through which a test sends arbitrary
+/// packets.
 class RawParticipant {
  public:
   /// `port` of 127.0.0.1 is where the other one listens.
@@ -27,9 +28,9 @@ class RawParticipant {
   [[nodiscard]] const Prefix& prefix() const { return prefix_; }
   void set_prefix(const Prefix& prefix) { prefix_ = prefix; }
   [[nodiscard]] std::uint16_t own_port() const { return own_port_; }
-  /// Of whom answered an announcement.
+  /// The peer that answered an announcement.
   [[nodiscard]] const Prefix& peer() const { return peer_; }
-  /// A message of this participant to the other one.
+  /// A message from this participant to the peer.
   [[nodiscard]] Packet packet() const { return Packet(prefix_).to(peer_); }
 
   /// Parameters of an announcement that is complete.
@@ -39,9 +40,9 @@ class RawParticipant {
                                        const std::string& type) const;
   /// Announces itself until the other one's announcement comes, at most `limit`.
   [[nodiscard]] bool meet(std::chrono::milliseconds limit);
-  /// Becomes a writer of "Topic" of "Type" that a reader of the other one knows; after meet().
+  /// Becomes a writer of "Topic" of "Type" that a reader of the peer knows; call it after meet().
   [[nodiscard]] bool become_writer(std::uint32_t entity, std::chrono::milliseconds limit) const;
-  /// Sends a message to where announcements go, and to where data goes if that is known.
+  /// Sends a message to the port for announcements, and to the port for data if it is known.
   void send(const PacketBytes& message) const;
   void send_data(const PacketBytes& message) const;
   [[nodiscard]] std::optional<PacketBytes> receive(std::chrono::milliseconds limit) const;

@@ -84,7 +84,7 @@ bool operator==(const Refusal& a, const Refusal& b) {
          shown(a.value_) == shown(b.value_) && shown(a.limit_) == shown(b.limit_);
 }
 
-/// As it is written in a test.
+/// Prints it as a test writes it.
 std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
   if (!refusal.refused_) return out << "Refusal::none()";
   out << "Refusal(" << quoted(refusal.file_);

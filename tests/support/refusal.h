@@ -8,7 +8,7 @@
 
 namespace trammel::test {
 
-/// What a refusal must say as data, whatever its words are: `Refusal("b.csv", 3,
+/// The data that a refusal must have, whatever its words: `Refusal("b.csv", 3,
 /// "q1_deg").beyond(241.2, 70)`.
 class Refusal {
  public:

@@ -9,8 +9,8 @@
 #include "server/base/units.h"
 #include "tests/support/small_cell.h"
 
-/// A stand-in for a model: it moves every target by the same vector in the robot's base, turns
-/// nothing, and knows it to 10 µm. What a program becomes with it can be worked out by hand.
+/// A stand-in for a model: it moves every target by the same vector in the robot's base, without a
+/// turn, with an uncertainty of 10 µm. The corrected program can be computed by hand.
 namespace trammel::test {
 
 inline const Vector3 kShift_mm(0.1234567, -0.2345678, 0.3456789);
@@ -46,7 +46,7 @@ inline Result<exchange::Answer<exchange::CorrectedTarget>> shift(
   return answer;
 }
 
-/// What the program becomes; the error's sentence where it is refused.
+/// The corrected program, or the sentence of the refusal.
 struct Corrected {
   cam::CorrectedProgram program;
   std::string refusal;
@@ -86,7 +86,7 @@ inline std::string without_numbers(const std::string& text) {
   return std::regex_replace(text, kNumber, "#");
 }
 
-/// The first row of that name; fails loudly by an empty status.
+/// The first row with that name; without one, the empty status fails the test.
 inline cam::ReceiptRow row_of(const cam::CorrectedProgram& program, const std::string& name) {
   for (const cam::ReceiptRow& row : program.rows) {
     if (row.name == name) return row;
@@ -94,7 +94,7 @@ inline cam::ReceiptRow row_of(const cam::CorrectedProgram& program, const std::s
   return {};
 }
 
-/// What the receipt says of the target of that name.
+/// The receipt's text for the target of that name.
 inline std::string why(const Corrected& made, const std::string& name) {
   return row_of(made.program, name).message;
 }

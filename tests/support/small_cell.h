@@ -7,8 +7,8 @@
 #include "server/compensate/compensated_model.h"
 #include "server/robot/cell.h"
 
-/// A cell whose trainings take milliseconds: the shipped robot, its base the only error source,
-/// nothing learned.
+/// A cell with trainings of milliseconds: the shipped robot, with the base as the only error source
+/// and without a bias.
 namespace trammel::test {
 
 [[nodiscard]] std::string small_robot_yaml();
@@ -27,8 +27,8 @@ struct SmallBatch {
 /// The batch that such a cell would measure.
 [[nodiscard]] std::string small_batch_csv(const Cell& cell, const SmallBatch& batch);
 
-/// A model without error sources that claims to have been trained on `training_poses`: two of them
-/// differ in content.
+/// A model without error sources that claims `training_poses` training poses, so that two such
+/// models differ in content.
 [[nodiscard]] CompensatedModel nominal_model(const std::shared_ptr<const Cell>& cell,
                                              int training_poses);
 

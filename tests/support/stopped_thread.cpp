@@ -37,7 +37,7 @@ StoppedThread::~StoppedThread() {
 void StoppedThread::bury() {
   if (!stopped_) return;
   int status = 0;
-  // Until it is gone; what else stops it on its way out is passed by.
+  // Until it is gone; other stops on its way out are ignored.
   while (::waitpid(thread_, &status, __WALL) == thread_ && WIFSTOPPED(status)) {
     ::ptrace(PTRACE_CONT, thread_, nullptr, nullptr);
   }

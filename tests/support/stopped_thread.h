@@ -25,7 +25,7 @@ class StoppedThread {
   StoppedThread& operator=(const StoppedThread&) = delete;
 
   [[nodiscard]] bool is_stopped() const { return stopped_; }
-  /// After its process has ended: nobody else learns of that before.
+  /// Call it after its process has ended; nobody else is notified before.
   void bury();
 
  private:

@@ -5,7 +5,7 @@
 
 namespace trammel::test {
 
-/// A new empty folder, removed with all that is in it at the end.
+/// A new empty folder, removed with its contents at the end.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -23,7 +23,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// What the file holds.
+/// The contents of the file.
 [[nodiscard]] std::string read_file(const std::string& path);
 
 }  // namespace trammel::test

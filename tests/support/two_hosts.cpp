@@ -35,8 +35,8 @@ bool ip(std::vector<std::string> words) {
   return run(words).exit_code == 0;
 }
 
-/// The end of an interface of this process's network namespace: its frames are read and written
-/// there. -1: none.
+/// The end of an interface in this process's network namespace, for reading and writing its frames.
+/// -1: none.
 int open_interface() {
   const int end = ::open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (end < 0) return -1;
@@ -48,7 +48,7 @@ int open_interface() {
   return -1;
 }
 
-/// Opens an interface in a namespace of that name, by a thread that goes there and ends.
+/// Opens an interface in the namespace of that name, by a thread that enters it and ends.
 int open_interface_in(const std::string& name) {
   int end = -1;
   std::thread([&] {
@@ -61,7 +61,7 @@ int open_interface_in(const std::string& name) {
 
 }  // namespace
 
-/// Carries frames between two interfaces, as badly as it is told to.
+/// Carries frames between two interfaces, with the given faults.
 class TwoHosts::Line {
  public:
   Line(std::array<int, 2> ends, const LineFaults& faults)
@@ -154,13 +154,13 @@ class TwoHosts::Line {
 
   std::array<int, 2> ends_;
   const LineFaults faults_;
-  std::atomic<int> to_repeat_{-1};  // the end that is to get again what it got; -1: none
+  std::atomic<int> to_repeat_{-1};  // the end that is to receive its frames again; -1: none
   std::atomic<std::size_t> repeated_{0};
   std::atomic<Clock::rep> cut_until_{0};
   std::atomic<std::uint64_t> carried_{0};
   std::multimap<Clock::time_point, Frame>
-      underway_;            // by when they arrive; of the thread, as all that follows
-  std::deque<Frame> past_;  // as they were carried
+      underway_;  // by arrival time; used by the line's thread alone, like the members below
+  std::deque<Frame> past_;  // in the order in which they were carried
   std::vector<char> buffer_ = std::vector<char>(kLargestFrame);
   std::mt19937_64 random_{1};
   std::uniform_real_distribution<double> uniform_{0, 1};

@@ -9,7 +9,7 @@
 
 namespace trammel::test {
 
-/// What a bad line does to the frames that it carries, each way.
+/// The faults of a bad line on its frames, each way.
 struct LineFaults {
   double lost = 0;                     ///< share, [0, 1]
   std::chrono::milliseconds delay{0};  ///< of each
@@ -17,8 +17,8 @@ struct LineFaults {
       0};  ///< at most that much more, so that frames overtake each other
 };
 
-/// Two hosts, 10.88.N.1 and 10.88.N.2, that see each other and nobody else: network namespaces
-/// whose cable is a thread of this process. They go with the test.
+/// Two hosts, 10.88.N.1 and 10.88.N.2, that see only each other: network namespaces with a thread
+/// of this process as their cable. They end with the test.
 class TwoHosts {
  public:
   explicit TwoHosts(const LineFaults& faults = {});
@@ -31,15 +31,15 @@ class TwoHosts {
   [[nodiscard]] const std::string& address(std::size_t host) const { return addresses_.at(host); }
   /// Takes a host's interface away, or gives it back.
   [[nodiscard]] bool set_interface(std::size_t host, bool up) const;
-  /// From now on nothing comes through for that long; says when it will again.
+  /// Interrupts the line for that long; returns the end of the interruption.
   std::chrono::steady_clock::time_point cut_for(std::chrono::milliseconds time);
   /// Frames that came through, both ways.
   [[nodiscard]] std::uint64_t carried() const;
   void wait_until_carried(std::uint64_t frames) const;
-  /// All frames that came from that host so far (the last 20,000) once more, as somebody on the
-  /// line can send them; how many these were.
+  /// Repeats all frames from that host so far (the last 20,000), as an intruder on the line could;
+  /// returns their number.
   std::size_t repeat_from(std::size_t host);
-  /// The same command on that host.
+  /// The same command for that host.
   [[nodiscard]] std::vector<std::string> on(std::size_t host, std::vector<std::string> argv) const;
 
  private:

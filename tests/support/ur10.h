@@ -8,14 +8,14 @@
 
 namespace trammel::test {
 
-/// Whether ../shared/data has the measured UR10.
+/// True if ../shared/data has the measured UR10.
 [[nodiscard]] bool has_ur10();
 
 /// Its cell: base and tool unknown.
 [[nodiscard]] std::shared_ptr<const Cell> ur10_cell();
 
-/// Series `name` (c or d) with every pose held out whose id ends in 7, 8 or 9; of the others every
-/// `stride`th, at most `training`. Of the poses held out every `held_stride`th.
+/// Series `name` (c or d). Poses with an id that ends in 7, 8 or 9 are held out; the batch has
+/// every `held_stride`th of these. It has every `stride`th of the other poses, at most `training`.
 [[nodiscard]] MeasurementBatch ur10_series(const std::string& name, int training = 1 << 30,
                                            int stride = 1, int held_stride = 1);
 

@@ -16,10 +16,10 @@ namespace trammel::test {
 /// cell-7 with base and tool unknown, for data as they arrive from a shop floor.
 [[nodiscard]] std::shared_ptr<const Cell> cell_7_unlocated();
 [[nodiscard]] VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell);
-/// The robot whose joint (1-based) has lost its zero by that much.
+/// The robot with the zero of a joint (1-based) off by that much.
 [[nodiscard]] VirtualRobot with_zero_off(VirtualRobot robot, int joint, double rad);
-/// The robot on a day of that temperature (degrees Celsius, recorded), its links growing by so much
-/// (1/K).
+/// The robot on a day with that recorded temperature (degrees Celsius), with links that grow by so
+/// much (1/K).
 [[nodiscard]] VirtualRobot in_warmth(VirtualRobot robot, double temperature, double growth);
 /// `poses` poses of the cell's ranges as its tracker measures them.
 [[nodiscard]] MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed,

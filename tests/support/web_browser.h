@@ -15,8 +15,8 @@
 
 namespace trammel::test {
 
-/// A real browser (Debian's chromium) that does what WebDriver tells it, with a profile of its own.
-/// Ends with the test.
+/// A real browser (Debian's chromium) controlled by WebDriver, with a profile of its own. Ends with
+/// the test.
 class WebBrowser {
  public:
   static constexpr const char* kDriver = "/usr/bin/chromedriver";
@@ -58,7 +58,7 @@ class WebBrowser {
   }
   /// Until it is loaded.
   void open(const std::string& address) { ask("POST", session_ + "/url", {{"url", address}}); }
-  /// What JavaScript that runs in the page returns.
+  /// The return value of JavaScript that runs in the page.
   nlohmann::json run(const std::string& script) {
     return ask("POST", session_ + "/execute/sync",
                {{"script", script}, {"args", nlohmann::json::array()}});
@@ -68,7 +68,7 @@ class WebBrowser {
     const nlohmann::json shot = ask("GET", session_ + "/screenshot", nullptr);
     return shot.is_string() ? decoded(shot.get<std::string>()) : "";
   }
-  /// What the console and the policy complained about since the last time.
+  /// The complaints of the console and the policy since the last call.
   std::vector<std::string> complaints() {
     std::vector<std::string> all;
     for (const nlohmann::json& one : ask("POST", session_ + "/se/log", {{"type", "browser"}}))
@@ -79,7 +79,7 @@ class WebBrowser {
  private:
   static constexpr std::chrono::seconds kLimit{30};
 
-  /// The driver keeps connections open, so that an answer ends where its length says.
+  /// True if the answer is complete by its length, since the driver keeps connections open.
   static bool is_whole(const std::string& bytes) {
     const std::size_t end = bytes.find("\r\n\r\n"), at = bytes.find("\r\nContent-Length:");
     if (end == std::string::npos || at == std::string::npos || at > end) return false;

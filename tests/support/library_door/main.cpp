@@ -1,5 +1,5 @@
-// A program that links libtrammel as others do: learns from a batch, or extends a cell by what it
-// shows, and says what became of it. `trammel_library_door train|extend CELL BATCH`; exit code 0
+// A program that links libtrammel as others do: it learns from a batch, or extends a cell by its
+// findings, and prints the result. `trammel_library_door train|extend CELL BATCH`; exit code 0
 // done, 1 nothing applied, 3 refused.
 #include <cstdio>
 #include <string>
