@@ -385,7 +385,7 @@ class Correcting {
     const auto by_place = [](const ReceiptRow& a, const ReceiptRow& b) {
       return std::tie(a.file, a.line) < std::tie(b.file, b.line);
     };
-    // A row is large, and those of a long program mostly stand as they shall.
+    // Rows are large, and most rows of a long program are already in their places.
     if (!std::is_sorted(result_.rows.begin(), result_.rows.end(), by_place))
       std::stable_sort(result_.rows.begin(), result_.rows.end(), by_place);
     write_counts();
