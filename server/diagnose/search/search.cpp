@@ -280,15 +280,12 @@ std::optional<SlowRival> Search::slow_instead(const Standing& standing, const Sc
   std::optional<SlowRival> slow = slow_rival(standing, seen, place);
   SearchResult with = result_;
   if (!slow || !add_to(with.after, standing.families[place]->source(seen.best[place]))) return slow;
-  refine(with.after, with.batch, with.unnamed);
-  const LinearProblem refined(with.after.model, with.batch, with.after.priors, {});
-  const Background all(background_columns(refined, with.unnamed));
-  const auto square_of = [](const LinearProblem& problem, const Background& background) {
-    const VectorXd projected = background.project(problem.residual());
-    return problem.residual().dot(projected);
-  };
-  const double explained =
-      square_of(standing.problem, standing.background) - square_of(refined, all);
+  // Weighed as stated: what a large step leaves to first order is no noise of the refined one.
+  refine(with.after, with.batch, with.unnamed, Weighed::kAsStated);
+  const VectorXd residual = standing.problem.residual();
+  const VectorXd projected = standing.background.project(residual);
+  const double after = standing.problem.residual_of(with.after.model).squaredNorm();
+  const double explained = residual.dot(projected) - after;
   slow->gap -= std::max(0.0, 0.5 * (explained - seen.best[place].strength));
   return slow;
 }
