@@ -276,8 +276,8 @@ std::string proof_table(const ordered_json& diagnosis) {
   const ordered_json& nothing = proof.at("nothing_put_in");
   std::string text = fmt::format(
       "\nProved in the residuals of this batch: named with {:.0f} % from this size on (rms; in "
-      "brackets 95 %)\n  {:<40}{:<40}{}\n",
-      100 * proof.at("named_share").get<double>(), "cause", "proved", "predicted");
+      "brackets 95 %)\n  {:<40}{:<13}{}\n",
+      100 * proof.at("named_share").get<double>(), "cause", "predicted", "proved");
   int open = 0, tried = 0, misnamed = 0;
   for (const ordered_json& cause : proof.at("causes")) {
     open += cause.at("outcome") == "open" ? 1 : 0;
@@ -285,8 +285,8 @@ std::string proof_table(const ordered_json& diagnosis) {
       tried += size.at("tried").get<int>();
       misnamed += size.at("misnamed").get<int>();
     }
-    text += fmt::format("  {:<40}{:<40}{}\n", cause_text(cause), proved_size(cause),
-                        micrometres(cause.at("predicted_mm")));
+    text += fmt::format("  {:<40}{:<13}{}\n", cause_text(cause),
+                        micrometres(cause.at("predicted_mm")), proved_size(cause));
   }
   text += fmt::format(
       "  (another cause named for sure: {} of {} diagnoses; with nothing put in: {} of {})\n",
