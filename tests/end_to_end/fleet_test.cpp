@@ -347,6 +347,11 @@ TEST_F(Fleet, WhileTheRecordIsAwayPredictionsGoOnAndNothingAcknowledgedIsLost) {
   const auto hasty = session_with({&first_}, seconds(4));
   const auto refused = hasty->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2));
   EXPECT_FALSE(refused) << "nothing is acknowledged that is not in the record";
+  const std::string status =
+      command({"status", "--service", "--port", std::to_string(first_.port()), "--domain",
+               std::to_string(first_.domain())});
+  EXPECT_NE(status.find(" is away since 20"), std::string::npos) << status;
+  EXPECT_NE(status.find("cell-7@1 "), std::string::npos) << "what is in force: " << status;
   database_.start();
   wait_until(
       [&] {
