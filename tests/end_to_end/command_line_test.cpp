@@ -1159,8 +1159,8 @@ TEST_F(CommandLine, NoBytesOfAModelFileEndTheProgram) {
 TEST_F(CommandLine, EvaluateAndReportWarnOfPosesThatDoNotFitTheModel) {
   const std::string model = train(measure("first", 60, 1), "M2");
   const std::string fresh = measure("fresh", 20, 2);
-  EXPECT_EQ(must({"evaluate", "--model", model, "--batch", fresh}).err.find("warning"),
-            std::string::npos);
+  const std::string fitting = must({"evaluate", "--model", model, "--batch", fresh}).err;
+  EXPECT_EQ(fitting.find("do not fit the model"), std::string::npos) << fitting;
   const CsvTable table = CsvTable::parse(test::read_file(fresh), fresh).value();
   const std::size_t y = table.require("y_mm").value(), x = table.require("x_mm").value();
   std::string text = fmt::format("{}\n", fmt::join(table.columns(), ","));
