@@ -94,6 +94,8 @@ class Search {
   [[nodiscard]] double named_path_score(const Standing& standing, const Admitted& open) const;
   [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice,
                                     std::size_t place) const;
+  [[nodiscard]] double gain_by_refining(const Standing& standing, const Scan& seen,
+                                        std::size_t place) const;
   [[nodiscard]] std::optional<SlowRival> slow_instead(const Standing& standing, const Scan& seen,
                                                       std::size_t place) const;
   [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen,
@@ -225,8 +227,10 @@ bool Search::is_function(const Standing& standing, const Choice& choice, std::si
   if (!named) return true;
   const std::vector<double>& score = choice.seen.score;
   const bool is_slow = !standing.families[best]->wanderer().empty();
-  return score[best] >
-             score[*named] + (is_slow ? thresholds::kSlowInstead : thresholds::kUnnamedMargin) &&
+  const bool is_step = !standing.families[*named]->cause(choice.seen.best[*named]).pose_id.empty();
+  const double refined = is_slow && is_step ? gain_by_refining(standing, choice.seen, *named) : 0;
+  return score[best] > score[*named] + refined +
+                           (is_slow ? thresholds::kSlowInstead : thresholds::kUnnamedMargin) &&
          named_path_score(standing, choice.open) < score[best];
 }
 
@@ -273,20 +277,24 @@ bool Search::holds_in_folds(const Standing& standing, const Choice& choice,
   return gain.after < gain.before;
 }
 
-/// The slow rival of the family at `place`. Both are judged to first order, which underestimates a
-/// large step. So the step is refined, and counts with its refined gain.
-std::optional<SlowRival> Search::slow_instead(const Standing& standing, const Scan& seen,
-                                              std::size_t place) const {
-  std::optional<SlowRival> slow = slow_rival(standing, seen, place);
+/// Nat: by how much the step at `place` explains more when it is refined than to first order, of
+/// which a large step falls short. Weighed as stated: what it leaves to first order is no noise.
+double Search::gain_by_refining(const Standing& standing, const Scan& seen,
+                                std::size_t place) const {
   SearchResult with = result_;
-  if (!slow || !add_to(with.after, standing.families[place]->source(seen.best[place]))) return slow;
-  // Weighed as stated: what a large step leaves to first order is no noise of the refined one.
+  if (!add_to(with.after, standing.families[place]->source(seen.best[place]))) return 0;
   refine(with.after, with.batch, with.unnamed, Weighed::kAsStated);
   const VectorXd residual = standing.problem.residual();
   const VectorXd projected = standing.background.project(residual);
   const double after = standing.problem.residual_of(with.after.model).squaredNorm();
-  const double explained = residual.dot(projected) - after;
-  slow->gap -= std::max(0.0, 0.5 * (explained - seen.best[place].strength));
+  return std::max(0.0, 0.5 * (residual.dot(projected) - after - seen.best[place].strength));
+}
+
+/// The slow rival of the family at `place`. It is judged to first order, the family refined.
+std::optional<SlowRival> Search::slow_instead(const Standing& standing, const Scan& seen,
+                                              std::size_t place) const {
+  std::optional<SlowRival> slow = slow_rival(standing, seen, place);
+  if (slow) slow->gap -= gain_by_refining(standing, seen, place);
   return slow;
 }
 
