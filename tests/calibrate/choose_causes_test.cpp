@@ -148,6 +148,21 @@ TEST(ChooseCauses, FindRunOutAndStiffnessThatAreHidden) {
     EXPECT_FALSE(has(chosen.sources, not_there)) << not_there;
 }
 
+/// 73.2 waves a turn are finer than a map, and no whole number.
+TEST(ChooseCauses, FindTheRippleOfAGearThatIsFinerThanAMap) {
+  test::HeavyArm arm = test::draw_heavy_arm({.seed = 5});
+  hidden::Effect effect;
+  effect.cause.cause = "gear_transmission";
+  effect.act = [](const hidden::MeasuringPose& pose, const Eigen::VectorXd&,
+                  hidden::Moment& moment) { moment.q(2) += 2e-4 * std::sin(73.2 * pose.q(2) + 1); };
+  arm.world.effects = {effect};
+  const MeasurementBatch batch = test::measured(arm, 200, 1);
+  const ChosenCauses chosen = test::demand(choose_causes(arm.cell, {}, batch));
+  EXPECT_TRUE(has(chosen.sources, "gear_transmission:3@73.")) << chosen.sources.back();
+  for (const char* not_there : {"gear_transmission:1", "gear_transmission:5", "joint_map"})
+    EXPECT_FALSE(has(chosen.sources, not_there)) << not_there;
+}
+
 TEST(ChooseCauses, TakeNothingWhereGeometryAloneIsTrue) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);

@@ -9,6 +9,7 @@
 #include "server/calibrate/causes/joint_blocks.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify/check_needs.h"
+#include "server/calibrate/identify/order_search.h"
 #include "server/calibrate/maps/learned_maps.h"
 #include "server/error_sources/catalogue.h"
 
@@ -59,7 +60,8 @@ const CauseRecord* gives_way_under(const CauseRecord& record) {
 bool may_be_tried(const CauseRecord& record) {
   const bool of_robot = record.scope == Scope::kArm || record.scope == Scope::kJoint;
   const bool linear = record.search == SearchFamily::kColumns ||
-                      record.search == SearchFamily::kPlay || record.search == SearchFamily::kMap;
+                      record.search == SearchFamily::kPlay || record.search == SearchFamily::kMap ||
+                      record.search == SearchFamily::kOrder;
   return of_robot && linear && record.lasting == causes::Lasting::kAlways &&
          record.part == causes::Part::kNone && record.forms.size() == 1 &&
          gives_way_under(record) == nullptr;
@@ -113,6 +115,7 @@ bool predicts(const Missed& before, const Missed& after, bool sure) {
 struct Candidate {
   std::string named;   ///< the spelling of a person
   std::string source;  ///< the spelling in the model and in the list to identify
+  double chance = 0;   ///< nat: what the best of the orders that were searched gains by chance
   ColumnGroup columns = {};
 };
 
@@ -212,7 +215,7 @@ class CauseSearch {
   [[nodiscard]] bool is_kept(const std::string& spec) const {
     const auto& kept = chosen_.sources;
     return std::any_of(kept.begin(), kept.end(), [&](const std::string& other) {
-      return without_learned_spectrum(other) == spec;
+      return without_learned_spectrum(other) == spec || other.starts_with(spec + "@");
     });
   }
 
@@ -220,11 +223,17 @@ class CauseSearch {
   void add_candidate(const std::string& named, const std::string& spec) {
     const Result<ErrorSourcePtr> source = make_error_source(spec, *cell_);
     if (!source || (*source)->parameters().empty()) return;
+    if (const auto search = (*source)->search()) {
+      add_candidate(named, with_likeliest_order(**source, base_, batch_));
+      if (!candidates_.empty() && candidates_.back().named == named)
+        candidates_.back().chance = std::log((search->to - search->from) / search->step);
+      return;
+    }
     CalibrationProblem alone{model_, batch_};
     alone.model.sources = {*source};
     if (!check_needs(alone)) return;
     add_source(model_, *source);
-    candidates_.push_back({named, (*source)->name()});
+    candidates_.push_back({named, (*source)->name(), 0, {}});
   }
 
   /// Tries the remaining causes by falling gain, each beside those taken before it.
@@ -239,7 +248,10 @@ class CauseSearch {
     while (!candidates_.empty()) {
       TRY(go_on_(1 - (1 - kCandidateShare) * static_cast<double>(candidates_.size()) / all));
       std::vector<CauseEvidence::Gain> gains;
-      for (const Candidate& one : candidates_) gains.push_back(evidence.gain_of(one.columns));
+      for (const Candidate& one : candidates_) {
+        gains.push_back(evidence.gain_of(one.columns));
+        gains.back().nat -= one.chance;
+      }
       const auto largest = std::max_element(gains.begin(), gains.end(),
                                             [](auto& a, auto& b) { return a.nat < b.nat; });
       const auto one = candidates_.begin() + (largest - gains.begin());

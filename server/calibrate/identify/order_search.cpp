@@ -173,6 +173,14 @@ Status search_orders(CalibrationProblem& problem, const CalibrateOptions& option
   return {};
 }
 
+std::string with_likeliest_order(const ErrorSource& source, const CalibrationResult& found,
+                                 const MeasurementBatch& batch) {
+  const MeasurementBatch there = aligned(batch, found.sessions, found.model.cell->tracker);
+  const Residuals r = residuals_of(found.model, there, found.model.values);
+  const FoundOrder best = best_order(source, found.model, there, r, weights_of(found, batch));
+  return fmt::format("{}@{:.4f}", source.name(), best.order);
+}
+
 std::map<std::string, std::string> found_orders(const PhysicalModel& model) {
   std::map<std::string, std::string> found;
   const std::vector<Eigen::Index> first = first_values(model);

@@ -17,4 +17,10 @@ namespace trammel {
 /// `name@order` for each searched source, by name: specs that need no search.
 [[nodiscard]] std::map<std::string, std::string> found_orders(const PhysicalModel& model);
 
+/// `source`, whose order nobody gave, spelled with the order that explains most of what `found`
+/// leaves of `batch`.
+[[nodiscard]] std::string with_likeliest_order(const ErrorSource& source,
+                                               const CalibrationResult& found,
+                                               const MeasurementBatch& batch);
+
 }  // namespace trammel
