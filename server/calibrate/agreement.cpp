@@ -167,7 +167,7 @@ class RowSearch {
   [[nodiscard]] static bool has_enough(const MeasurementBatch& rows,
                                        const CalibrationResult& found) {
     double equations = 0;
-    for (const Measurement& m : rows.measurements) equations += m.gauge ? 1 : 3;
+    for (const Measurement& m : rows.measurements) equations += m.gauge ? m.gauge->numbers() : 3;
     return equations >= kEquations * static_cast<double>(found.parameters.size());
   }
 

@@ -84,10 +84,10 @@ class CompensatedModel {
   };
   /// All rows must have positions.
   [[nodiscard]] LevelErrors errors_B(const MeasurementBatch& batch) const;
-  /// Measured minus predicted of every gauge, m, at the three levels, and the standard deviation of
-  /// compensated.
+  /// Measured minus predicted of every number of the gauges, m, at the three levels, and the
+  /// standard deviation of compensated.
   struct GaugeErrors {
-    std::vector<std::size_t> rows;  ///< of the batch
+    std::vector<std::size_t> rows;  ///< of the batch; a contact's stands three times
     Eigen::VectorXd nominal, calibrated, compensated, stddev;
     std::vector<bool> in_domain;
   };

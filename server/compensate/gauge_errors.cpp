@@ -37,32 +37,71 @@ Gauging gauging_of(const ModelParts& parts) {
   return gauging;
 }
 
-/// The value at one pose, and its variance without the instrument's noise if a bias contributes.
-struct Told {
-  double value = 0, variance = 0;
+/// A gauge at the poses that it compares, with the answers of the model there.
+struct AskedGauge {
+  Gauge gauge;  ///< its `minus` is the second of `poses`
+  std::vector<PoseContext> poses;
+  std::vector<ErrorPrediction> predictions;
+  bool in_domain = true;
+
+  /// The tool points of `place_B` in place of those of the model's parameters.
+  [[nodiscard]] ToolPoint points(const Pose& X_WB, Pose ErrorPrediction::*place_B) const {
+    return [this, X_WB, place_B](const PoseContext& context, Eigen::MatrixXd*) -> Vector3 {
+      const std::size_t k = &context == gauge.minus.get() ? 1 : 0;
+      return X_WB * (predictions[k].*place_B).translation();
+    };
+  }
 };
 
-/// The reading by the predicted tool, with its bias.
-Told told_with_bias(const ErrorPrediction& prediction, const Gauge& gauge,
-                    const PlacedAnchor& anchor, const PhysicalModel& physics) {
-  const GaugedLength length = gauged_length(gauge.kind, *anchor.said, anchor.p_W(physics.values),
-                                            physics.X_WB * prediction.X_BT_predicted.translation());
-  const Vector3 along_B = physics.X_WB.linear().transpose() * length.by_point_W;
-  const double tracker = physics.cell->tracker.sigma * physics.cell->tracker.sigma;
-  return {length.value + anchor.zero_at(physics.values),
-          std::max(0.0, along_B.dot(prediction.covariance_B * along_B) -
-                            tracker * along_B.squaredNorm())};
+/// The derivative of the gauge's numbers by the tool point of pose `k`, up to its sign: numbers x 3.
+Eigen::MatrixXd by_tool_point(const PhysicalModel& physics, const AskedGauge& asked,
+                              std::size_t k) {
+  const auto p_W = [&](std::size_t of) -> Vector3 {
+    return physics.X_WB * asked.predictions[of].X_BT_predicted.translation();
+  };
+  switch (asked.gauge.kind) {
+    case Gauge::Kind::kContact:
+      return Matrix3::Identity();
+    case Gauge::Kind::kApart:
+      return length_of(p_W(0) - p_W(1)).by_point_W.transpose();
+    case Gauge::Kind::kDistance:
+    case Gauge::Kind::kTouch:
+      break;
+  }
+  const Anchor anchor = placed_anchor(physics, asked.gauge.anchor).at(physics.values);
+  return gauged_length(asked.gauge.kind, anchor, p_W(k)).by_point_W.transpose();
 }
 
-double nominal_of(const PhysicalModel& physics, const PoseContext& context, const Gauge& gauge,
-                  const PlacedAnchor& anchor) {
-  const auto at = [&](const PoseContext& pose) {
-    return gauged_length(gauge.kind, *anchor.said, anchor.p_W(physics.values),
-                         physics.nominal_pose_W(pose).translation())
-               .value +
-           anchor.zero_at(physics.values);
-  };
-  return at(context) - (gauge.minus != nullptr ? at(*gauge.minus) : 0);
+/// m², of each number by the predictions with the bias, without the instrument's noise.
+Eigen::VectorXd variance_with_bias(const PhysicalModel& physics, const AskedGauge& asked) {
+  const double tracker = std::pow(physics.cell->tracker.sigma, 2);
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(asked.gauge.numbers());
+  for (std::size_t k = 0; k < asked.poses.size(); ++k) {
+    const Eigen::MatrixXd along_B = by_tool_point(physics, asked, k) * physics.X_WB.linear();
+    const Matrix3 true_B =
+        asked.predictions[k].covariance_B - tracker * Matrix3::Identity();  // without the tracker
+    variance += (along_B * true_B * along_B.transpose()).diagonal().cwiseMax(0.0);
+  }
+  return variance;
+}
+
+/// m², of each number by the parameters `J` and the model's own error, likewise. The joint
+/// covariance of anchors and arm is known.
+Eigen::VectorXd variance_without_bias(const Gauging& gauging, const ModelParts& parts,
+                                      const AskedGauge& asked, const Eigen::MatrixXd& J) {
+  const Domain domain{parts.q_min, parts.q_max, parts.prior_share_limit};
+  Eigen::VectorXd variance = (J * gauging.covariance * J.transpose()).diagonal();
+  for (const PoseContext& pose : asked.poses)
+    variance.array() += std::pow(parts.discrepancy, 2) +
+                        domain.growth(pose.q, parts.extrapolation_slope,
+                                      gauging.physics.cell->robot);
+  return variance;
+}
+
+/// Appends the numbers of one gauge.
+void append(Eigen::VectorXd& all, const Eigen::VectorXd& more) {
+  all.conservativeResize(all.size() + more.size());
+  all.tail(more.size()) = more;
 }
 
 }  // namespace
@@ -70,49 +109,43 @@ double nominal_of(const PhysicalModel& physics, const PoseContext& context, cons
 CompensatedModel::GaugeErrors CompensatedModel::gauge_errors(const MeasurementBatch& batch) const {
   const Gauging gauging = gauging_of(parts());
   const PhysicalModel& physics = gauging.physics;
-  const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
   const bool own = is_own(batch);
   GaugeErrors errors;
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
-    if (batch.measurements[i].gauge) errors.rows.push_back(i);
-  }
-  const auto n = static_cast<Eigen::Index>(errors.rows.size());
-  for (Eigen::VectorXd* one :
-       {&errors.nominal, &errors.calibrated, &errors.compensated, &errors.stddev})
-    one->resize(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Measurement& m = batch.measurements[errors.rows[static_cast<std::size_t>(i)]];
-    Gauge gauge = *m.gauge;
-    const PlacedAnchor anchor = placed_anchor(physics, gauge.anchor);
-    std::vector<PoseContext> poses = {m.context};
-    if (gauge.minus != nullptr) poses.push_back(*gauge.minus);
-    double variance = std::pow(m.sigma.value_or(cell().tracker.sigma), 2);
-    Told with_bias;
-    bool in_domain = true;
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      poses[k].served = !own;
-      const ErrorPrediction prediction = predict(poses[k]);
-      in_domain = in_domain && prediction.in_domain;
-      poses[k] = completed(poses[k]);
-      const Told told = told_with_bias(prediction, gauge, anchor, physics);
-      with_bias.value += k == 0 ? told.value : -told.value;
-      with_bias.variance += told.variance;
-      if (!inside_->bias) {
-        variance += std::pow(parts().discrepancy, 2) +
-                    domain.growth(poses[k].q, parts().extrapolation_slope, physics.cell->robot);
-      }
+  for (std::size_t row = 0; row < batch.measurements.size(); ++row) {
+    const Measurement& m = batch.measurements[row];
+    if (!m.gauge) continue;
+    AskedGauge asked{*m.gauge, {m.context}, {}};
+    if (m.gauge->minus != nullptr) asked.poses.push_back(*m.gauge->minus);
+    for (PoseContext& pose : asked.poses) {
+      pose.served = !own;
+      asked.predictions.push_back(predict(pose));
+      asked.in_domain = asked.in_domain && asked.predictions.back().in_domain;
+      pose = completed(pose);
     }
-    if (gauge.minus != nullptr) gauge.minus = std::make_shared<const PoseContext>(poses[1]);
-    Eigen::RowVectorXd J;
-    const double calibrated = predicted_gauge(physics, poses[0], gauge, physics.values, &J);
-    // Without a bias, the joint covariance of anchors and arm is known.
-    variance +=
-        inside_->bias ? with_bias.variance : (J * gauging.covariance * J.transpose()).value();
-    errors.nominal(i) = gauge.value - nominal_of(physics, poses[0], gauge, anchor);
-    errors.calibrated(i) = gauge.value - calibrated;
-    errors.compensated(i) = gauge.value - (inside_->bias ? with_bias.value : calibrated);
-    errors.stddev(i) = std::sqrt(variance);
-    errors.in_domain.push_back(in_domain);
+    if (m.gauge->minus != nullptr)
+      asked.gauge.minus = std::make_shared<const PoseContext>(asked.poses[1]);
+    const auto residual = [&](const Eigen::VectorXd& predicted) -> Eigen::VectorXd {
+      return asked.gauge.value - predicted.array();
+    };
+    const auto at = [&](Pose ErrorPrediction::*place_B) {
+      return residual(predicted_gauge(physics, asked.points(physics.X_WB, place_B), asked.poses[0],
+                                      asked.gauge, physics.values));
+    };
+    Eigen::MatrixXd J;
+    const Eigen::VectorXd calibrated =
+        residual(predicted_gauge(physics, asked.poses[0], asked.gauge, physics.values, &J));
+    const bool biased = static_cast<bool>(inside_->bias);
+    const Eigen::VectorXd variance = biased
+                                         ? variance_with_bias(physics, asked)
+                                         : variance_without_bias(gauging, parts(), asked, J);
+    const double noise = std::pow(m.sigma.value_or(cell().tracker.sigma), 2);
+    append(errors.nominal, at(&ErrorPrediction::X_BT_nominal));
+    append(errors.calibrated, calibrated);
+    append(errors.compensated, biased ? at(&ErrorPrediction::X_BT_predicted) : calibrated);
+    append(errors.stddev, (variance.array() + noise).sqrt());
+    errors.rows.insert(errors.rows.end(), static_cast<std::size_t>(variance.size()), row);
+    errors.in_domain.insert(errors.in_domain.end(), static_cast<std::size_t>(variance.size()),
+                            asked.in_domain);
   }
   return errors;
 }

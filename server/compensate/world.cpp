@@ -101,7 +101,9 @@ Status check_gauges(const CompensatedModel& model, const MeasurementBatch& batch
     return require_positions(batch, "placing several set-ups of the instrument");
   const Anchors anchors = TRY(anchors_of(model.cell()));
   for (const Measurement& m : batch.measurements) {
-    if (!m.gauge || placed_anchor(model.parts().physics, m.gauge->anchor).said != nullptr) continue;
+    if (!m.gauge || m.gauge->kind == Gauge::Kind::kApart ||
+        placed_anchor(model.parts().physics, m.gauge->anchor).said != nullptr)
+      continue;
     const auto known = anchors.find(m.gauge->anchor);
     if (known != anchors.end() && known->second.p_W) continue;
     return refused("model {} does not know where anchor '{}' is", model.provenance().id,

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kTypical =
     2;  // mm, as for a base; the prior of an unknown one is widened as that of a base is
+constexpr double kTypicalTilt = 1e-3;  // rad, likewise
 
 const CauseRecord& record() {
   static const CauseRecord of_instruments = {
@@ -34,9 +35,15 @@ const CauseRecord& record() {
 Instruments::Instruments(std::string name, Anchors anchors)
     : name_(std::move(name)), anchors_(std::move(anchors)) {
   for (const auto& [id, anchor] : anchors_) {
-    if (name_ == kAnchors ? anchor.p_W.has_value() : anchor.zero.has_value()) continue;
+    const bool is_open_plane = anchor.shape == Anchor::Shape::kPlane && !anchor.p_W;
+    if (name_ == kAnchors ? anchor.p_W.has_value() : anchor.zero.has_value() || is_open_plane)
+      continue;
     first_[id] = static_cast<Eigen::Index>(parameters_.size());
-    if (name_ == kAnchors) {
+    if (name_ == kAnchors && is_open_plane) {
+      parameters_.push_back(length_parameter(fmt::format("offset[{}]", id), kTypical));
+      for (const char* tilt : {"tilt1", "tilt2"})
+        parameters_.push_back(angle_parameter(fmt::format("{}[{}]", tilt, id), kTypicalTilt));
+    } else if (name_ == kAnchors) {
       for (const char* axis : {"ax", "ay", "az"})
         parameters_.push_back(length_parameter(fmt::format("{}[{}]", axis, id), kTypical));
     } else {

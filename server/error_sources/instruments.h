@@ -18,9 +18,10 @@ inline constexpr std::string_view kInstrumentZero = "instrument_zero";
 [[nodiscard]] bool is_of_instruments(const ErrorSource& source);
 
 /// Makes one of two sources. `anchors` has `ax[ID]`, `ay[ID]`, `az[ID]` (m in W) for each anchor
-/// whose place the cell file leaves open; they are 0 until they are identified. `instrument_zero`
-/// has `zero[ID]` (m) for each instrument whose zero the file leaves open. Refuses any other
-/// spelling.
+/// whose place the cell file leaves open; they are 0 until they are identified. A plane of unknown
+/// place has `offset[ID]` (m) and `tilt1[ID]`, `tilt2[ID]` (rad, tilted_normal()) in their stead.
+/// `instrument_zero` has `zero[ID]` (m) for each instrument whose zero the file leaves open; that
+/// of a plane of unknown place is a part of its offset. Refuses any other spelling.
 [[nodiscard]] Result<ErrorSourcePtr> make_instrument_source(const std::string& spec,
                                                             const Cell& cell);
 

@@ -36,13 +36,13 @@ bool is_all_by_zeros(const HealthCheck& check) {
          std::all_of(check.changed.begin(), check.changed.end(), leaves_nothing);
 }
 
-Result<HealthCheck> looked_through(const CompensatedModel& model, const CheckedBatch& batch,
+Result<HealthCheck> looked_through(const CompensatedModel& model, const MeasurementBatch& batch,
                                    const HealthOptions& options) {
-  const MeasurementBatch known = known_rows(model, batch.rows());
+  const MeasurementBatch known = known_rows(model, batch);
   if (known.measurements.empty()) {
     return refused("no pose has a tool and payload that model {} was trained with",
                    model.provenance().id)
-        .in("batch " + batch.id());
+        .in("batch " + batch.id);
   }
   const std::vector<PoseContext> contexts = health::contexts_of(model, known);
   const CauseEffects effects(model.parts().physics, contexts, model.parts().temperature_mean);
@@ -57,7 +57,7 @@ Result<HealthCheck> looked_through(const CompensatedModel& model, const CheckedB
                                             model.parts().training.poses);
   HealthCheck check =
       health::Examination(options, effects, working, std::move(*rows), tails, model.cell().robot)
-          .result({model.provenance().measured_at, batch.rows().measured_at});
+          .result({model.provenance().measured_at, batch.measured_at});
   check.model = model.provenance().id;
   return check;
 }
@@ -78,6 +78,8 @@ std::string_view to_string(HealthVerdict verdict) {
 
 Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBatch& batch,
                                  const HealthOptions& options) {
+  if (const auto contacts = about_one_point(batch.rows()))
+    return looked_through(model, *contacts, options);
   TRY(require_positions(batch.rows(), "a check"));
   if (has_sessions(batch.rows())) {
     return refused("a check is one set-up of the instrument, the batch has {}",
@@ -86,7 +88,7 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
         .of("session_id")
         .next("check each session by itself");
   }
-  Result<HealthCheck> check = looked_through(model, batch, options);
+  Result<HealthCheck> check = looked_through(model, batch.rows(), options);
   if (check && is_all_by_zeros(*check)) return check;
   if (std::optional<Error> doubt = reading_doubt(batch.rows(), model.cell()))
     return tl::make_unexpected(std::move(*doubt));

@@ -53,12 +53,24 @@ MeasurementBatch positions_of(const MeasurementBatch& batch) {
   return positions;
 }
 
+std::optional<MeasurementBatch> about_one_point(const MeasurementBatch& batch) {
+  MeasurementBatch positions = batch;
+  for (Measurement& m : positions.measurements) {
+    if (!m.gauge || m.gauge->kind != Gauge::Kind::kContact ||
+        m.gauge->anchor != batch.measurements.front().gauge->anchor)
+      return std::nullopt;
+    m.gauge.reset();
+    m.p_W.setZero();
+  }
+  return positions;
+}
+
 Status require_positions(const MeasurementBatch& batch, const std::string& who) {
   const auto gauged = std::find_if(batch.measurements.begin(), batch.measurements.end(),
                                    [](const Measurement& m) { return m.gauge.has_value(); });
   if (gauged == batch.measurements.end()) return {};
   const std::string column =
-      gauged->gauge->kind == Gauge::Kind::kDistance ? "distance_mm" : "touch_mm";
+      gauged->gauge->kind == Gauge::Kind::kTouch ? "touch_mm" : "distance_mm";
   return refused("a row has {} and no position, {} works with positions alone", column, who)
       .in(batch.where.empty() ? "batch " + batch.id : batch.where)
       .at_row(gauged->row)
@@ -69,6 +81,9 @@ Status require_positions(const MeasurementBatch& batch, const std::string& who) 
 Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& anchors) {
   if (!measurement.gauge) return {};
   Gauge& gauge = *measurement.gauge;
+  if (gauge.kind == Gauge::Kind::kApart) return check_minus(gauge, cell);
+  const bool is_named = anchors.contains(gauge.anchor) || gauge.anchor.empty();
+  if (gauge.kind == Gauge::Kind::kContact && (anchors.empty() || !is_named)) return {};
   std::string id = TRY(resolved(gauge.anchor, cell, anchors));
   gauge.anchor = std::move(id);
   const Anchor& anchor = anchors.at(gauge.anchor);
@@ -79,6 +94,12 @@ Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& an
         .next(
             "say in the cell file what is touched: sphere_radius_mm, plane_normal, or ring_axis "
             "and ring_radius_mm");
+  }
+  if (gauge.kind == Gauge::Kind::kContact && anchor.shape != Anchor::Shape::kPoint) {
+    return refused("distance_mm is 0 from anchor '{}', which is no point", gauge.anchor)
+        .of("distance_mm")
+        .with_text(gauge.anchor)
+        .next("write touch_mm for what a surface was touched at");
   }
   if (!measurement.sigma) measurement.sigma = anchor.sigma;
   return check_minus(gauge, cell);

@@ -64,7 +64,8 @@ struct MeasurementBatch {
 /// pose_id. The error names `where`, row, column, value and limit. An empty field in an optional
 /// column means that nothing was recorded. Joints are counted, but not checked against a robot. A
 /// row has a position, or one of `distance_mm` and `touch_mm` with `anchor_id`, optionally against
-/// the pose `minus_pose_id`. A row to which such an id refers may have no value; it is then not a
+/// the pose `minus_pose_id`, or a `distance_mm` from the pose `from_pose_id`. A `distance_mm` of 0
+/// to an anchor is a contact. A row to which such an id refers may have no value; it is then not a
 /// measurement.
 [[nodiscard]] Result<MeasurementBatch> parse_batch_csv(const std::string& text,
                                                        const std::string& where);

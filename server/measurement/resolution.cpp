@@ -36,7 +36,7 @@ std::vector<double> stated_sigmas(const MeasurementBatch& batch, const Cell& cel
 std::vector<std::vector<double>> columns_mm(const MeasurementBatch& batch, bool of_gauges) {
   std::vector<std::vector<double>> all(of_gauges ? 1 : 3);
   for (const Measurement& m : batch.measurements) {
-    if (m.gauge.has_value() != of_gauges) continue;
+    if (m.gauge.has_value() != of_gauges || (m.gauge && !m.gauge->is_reading())) continue;
     for (std::size_t k = 0; k < all.size(); ++k)
       all[k].push_back(to_mm(of_gauges ? m.gauge->value : m.p_W(static_cast<Eigen::Index>(k))));
   }

@@ -37,8 +37,7 @@ void read_shape(const YamlMap& map, Anchor& anchor) {
     anchor.direction_W = read_direction(map, "ring_axis");
     anchor.radius = read_radius(map, "ring_radius_mm");
   }
-  if ((plane || ring) && !anchor.p_W)
-    map.refuse("xyz_mm", "where a plane or a ring is must be known");
+  if (ring && !anchor.p_W) map.refuse("xyz_mm", "where a ring is must be known");
 }
 
 Anchor read_anchor(const YamlMap& map) {

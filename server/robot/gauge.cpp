@@ -1,20 +1,17 @@
 #include "server/robot/gauge.h"
 
+#include "server/base/check.h"
+
 namespace trammel {
 
-namespace {
-
-/// The length of `d`, with its derivative if it exists.
 GaugedLength length_of(const Vector3& d) {
   const double length = d.norm();
   return {length, length > 0 ? Vector3(d / length) : Vector3::Zero()};
 }
 
-}  // namespace
-
-GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_WA,
-                           const Vector3& p_W) {
-  const Vector3 d = p_W - p_WA;
+GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_W) {
+  TRAMMEL_CHECK(anchor.p_W);
+  const Vector3 d = p_W - *anchor.p_W;
   if (kind == Gauge::Kind::kDistance) return length_of(d);
   const Vector3& n = anchor.direction_W;
   switch (anchor.shape) {

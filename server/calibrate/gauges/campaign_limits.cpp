@@ -184,6 +184,29 @@ void add_short_strokes(const MeasurementBatch& batch, CalibrationResult& found) 
   }
 }
 
+/// True if some row compares the arm with a length: contacts and touches of planes and points with
+/// unknown places fit an arm of every size.
+bool tells_size(const PhysicalModel& model, const MeasurementBatch& batch) {
+  const auto tells = [&](const Measurement& m) {
+    if (!m.gauge || m.gauge->kind == Gauge::Kind::kDistance ||
+        m.gauge->kind == Gauge::Kind::kApart || m.gauge->minus != nullptr)
+      return true;
+    const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);
+    return anchor.said == nullptr || anchor.said->p_W.has_value() || anchor.said->radius > 0;
+  };
+  return std::any_of(batch.measurements.begin(), batch.measurements.end(), tells);
+}
+
+void add_untold_size(const MeasurementBatch& batch, CalibrationResult& found) {
+  if (tells_size(found.model, batch)) return;
+  found.unidentifiable.push_back(
+      {0,
+       {},
+       "contacts and touches at unknown places fit an arm of every size, so they do not tell the "
+       "robot's size (all lengths alike): it stays as drawn; one known length between two poses "
+       "(distance_mm with from_pose_id) would tell"});
+}
+
 }  // namespace
 
 int untold_motions(const PhysicalModel& model, const MeasurementBatch& batch) {
@@ -204,6 +227,7 @@ int untold_motions(const PhysicalModel& model, const MeasurementBatch& batch) {
 void add_campaign_limits(const MeasurementBatch& batch, CalibrationResult& found) {
   add_untold_base(batch, found);
   add_short_strokes(batch, found);
+  add_untold_size(batch, found);
 }
 
 }  // namespace trammel

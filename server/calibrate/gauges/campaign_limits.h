@@ -10,8 +10,8 @@ namespace trammel {
 [[nodiscard]] int untold_motions(const PhysicalModel& model, const MeasurementBatch& batch);
 
 /// Adds to `found`, identified on gauges of `batch`, the limits of such a campaign in words: the
-/// place of the base and, if the stroke is short beside the instrument's length, the size of the
-/// robot.
+/// place of the base and, if the stroke is short beside the instrument's length or nothing is a
+/// length, the size of the robot.
 void add_campaign_limits(const MeasurementBatch& batch, CalibrationResult& found);
 
 }  // namespace trammel

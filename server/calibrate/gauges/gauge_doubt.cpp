@@ -85,14 +85,16 @@ std::optional<Error> doubt_of_rows(const MeasurementBatch& distances, const Eige
   return std::nullopt;
 }
 
-std::optional<Error> doubt_of_distances(const CellPtr& cell, const MeasurementBatch& batch) {
-  const MeasurementBatch distances = read_as(batch, Gauge::Kind::kDistance, 1);
+/// `kind`: kDistance or kApart.
+std::optional<Error> doubt_of_distances(const CellPtr& cell, const MeasurementBatch& batch,
+                                        Gauge::Kind kind) {
+  const MeasurementBatch distances = read_as(batch, kind, 1);
   if (distances.measurements.empty()) return std::nullopt;
   const auto given = off_drawing(cell, distances);
   const double as_given = given ? median_size(*given) : kNowhere;
   if (as_given < kNoModelError) return doubt_of_rows(distances, *given);
   for (const UnitOfLength& unit : kUnitsOfLength) {
-    const auto then = off_drawing(cell, read_as(batch, Gauge::Kind::kDistance, unit.factor));
+    const auto then = off_drawing(cell, read_as(batch, kind, unit.factor));
     if (!then || median_size(*then) > std::min(kNoModelError, kMuchBetter * as_given)) continue;
     return refused(
                "the distances do not follow the joints; read in {} they would, to {:.1f} mm of the "
@@ -295,7 +297,8 @@ std::optional<Error> doubt_of_touches(const CellPtr& cell, const MeasurementBatc
 std::optional<Error> gauge_doubt(const MeasurementBatch& batch, const Cell& cell) {
   const auto shared = std::make_shared<const Cell>(cell);
   if (auto doubt = doubt_of_wires(cell, batch)) return doubt;
-  if (auto doubt = doubt_of_distances(shared, batch)) return doubt;
+  for (const Gauge::Kind kind : {Gauge::Kind::kDistance, Gauge::Kind::kApart})
+    if (auto doubt = doubt_of_distances(shared, batch, kind)) return doubt;
   return doubt_of_touches(shared, batch);
 }
 

@@ -21,25 +21,33 @@ constexpr std::size_t kFewest = 4;     // values for the three coordinates of an
                                        // check them
 constexpr double kLeastBeside = 1e-2;  // m rms: tool points closer to one line than this do not
                                        // determine the other two directions
+constexpr std::size_t kFewestContacts = 2;  // the first one only places the point
+constexpr double kMostTilted = 0.5;         // cosine of the angle from the stated normal
 constexpr int kRefinements = 50;
 constexpr double kLastStep = 1e-9;  // m
 
 /// The lengths measured to one anchor.
 struct Lengths {
   std::vector<Vector3> points_W;
-  std::vector<double> lengths;  ///< m, from the anchor's point
+  std::vector<double> lengths;  ///< m, from the anchor's point, or above its plane
+  std::vector<Vector3> contacts_W = {};  ///< tool points that met the anchor's point
 };
 
 std::map<std::string, Lengths> lengths_of(const PhysicalModel& model,
                                           const MeasurementBatch& batch) {
   std::map<std::string, Lengths> all;
   for (const Measurement& m : batch.measurements) {
-    if (!m.gauge) continue;
+    if (!m.gauge || m.gauge->kind == Gauge::Kind::kApart) continue;
     const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);
     if (anchor.place < 0) continue;
     Lengths& one = all[m.gauge->anchor];
     if (m.gauge->minus != nullptr) continue;
-    one.points_W.push_back(model.pose_W(m.context).translation());
+    const Vector3 p_W = model.pose_W(m.context).translation();
+    if (m.gauge->kind == Gauge::Kind::kContact) {
+      one.contacts_W.push_back(p_W);
+      continue;
+    }
+    one.points_W.push_back(p_W);
     const double surface = m.gauge->kind == Gauge::Kind::kTouch ? anchor.said->radius : 0;
     one.lengths.push_back(m.gauge->value + surface - anchor.said->zero.value_or(0));
   }
@@ -181,7 +189,7 @@ Status check_told(const std::string& id, const Lengths& of) {
         .next("measure more poses, or give its xyz_mm in the cell file");
   }
   const double beside = spread_of(of.points_W).rms(1);
-  if (beside >= kLeastBeside) return {};
+  if (beside >= kLeastBeside) return {};  // of a plane, too
   return refused(
              "anchor '{}': the tool points lie on one line within {:.1f} mm, limit {:g} mm: they "
              "do not tell where it is",
@@ -190,6 +198,45 @@ Status check_told(const std::string& id, const Lengths& of) {
       .with_text(id)
       .beyond(to_mm(beside), to_mm(kLeastBeside))
       .next("measure from all sides, or give its xyz_mm in the cell file");
+}
+
+/// The point that the tool met.
+Result<Vector3> met_point(const std::string& id, const std::vector<Vector3>& contacts_W) {
+  if (contacts_W.size() < kFewestContacts)
+    return refused("anchor '{}': the tool met it once, which tells nothing of the arm", id)
+        .of("anchor_id")
+        .beyond(contacts_W.size(), kFewestContacts)
+        .with_text(id)
+        .next("meet it in ten postures or more");
+  Vector3 mean = Vector3::Zero();
+  for (const Vector3& p_W : contacts_W) mean += p_W / static_cast<double>(contacts_W.size());
+  return mean;
+}
+
+/// Offset and tilts of the plane through the touches.
+Result<Vector3> plane_through(const std::string& id, const Lengths& of, const Vector3& stated) {
+  const Spread spread = spread_of(of.points_W);
+  const Vector3 across = spread.axes.col(2);
+  const Vector3 n = across.dot(stated) < 0 ? Vector3(-across) : across;
+  if (n.dot(stated) < kMostTilted)
+    return refused("anchor '{}': the plane through its touches is {:.0f} deg from plane_normal", id,
+                   to_deg(std::acos(n.dot(stated))))
+        .of("anchors")
+        .with_text(id)
+        .next("correct plane_normal in the cell file: it points away from the body");
+  const double height = std::accumulate(of.lengths.begin(), of.lengths.end(), 0.0) /
+                        static_cast<double>(of.lengths.size());
+  Vector3 values;
+  values << n.dot(spread.mean) - height, tilt_to(stated, n);
+  return values;
+}
+
+/// The three values of an unknown anchor.
+Result<Vector3> told_values(const std::string& id, const Lengths& of, const PlacedAnchor& anchor) {
+  if (!of.contacts_W.empty()) return met_point(id, of.contacts_W);
+  TRY(check_told(id, of));
+  if (anchor.is_open_plane()) return plane_through(id, of, anchor.said->direction_W);
+  return place_of(of, spread_of(of.points_W));
 }
 
 }  // namespace
@@ -206,7 +253,7 @@ Result<std::vector<std::string>> with_instruments(std::vector<std::string> specs
   const auto add = [&](std::string_view spec) {
     if (std::find(specs.begin(), specs.end(), spec) == specs.end()) specs.emplace_back(spec);
   };
-  add(kAnchors);
+  if (!anchors.empty()) add(kAnchors);
   if (open) add(kInstrumentZero);
   return specs;
 }
@@ -221,10 +268,14 @@ Status check_gauges(const PhysicalModel& model, const MeasurementBatch& batch) {
         .next("give each set-up that has them to a training of its own");
   }
   for (const Measurement& m : batch.measurements) {
-    if (m.gauge && placed_anchor(model, m.gauge->anchor).said == nullptr)
+    if (m.gauge && m.gauge->kind != Gauge::Kind::kApart &&
+        placed_anchor(model, m.gauge->anchor).said == nullptr)
       return refused("no anchor '{}' in the cell file", m.gauge->anchor)
           .in("batch " + batch.id)
-          .at_row(m.row);
+          .at_row(m.row)
+          .of("anchor_id")
+          .with_text(m.gauge->anchor)
+          .next("a point that the tool met stands there as anchors: {spike: {xyz_mm: null}}");
   }
   const Cell& cell = *model.cell;
   if (has_positions(batch) || (cell.X_WB && !has_unknown_tool(cell))) return {};
@@ -239,9 +290,10 @@ Status check_gauges(const PhysicalModel& model, const MeasurementBatch& batch) {
 
 Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch) {
   for (const auto& [id, of] : lengths_of(model, batch)) {
-    if (const Status told = check_told(id, of); !told)
-      return Failure(told.error()).in("batch " + batch.id);
-    model.values.segment<3>(placed_anchor(model, id).place) = place_of(of, spread_of(of.points_W));
+    const PlacedAnchor anchor = placed_anchor(model, id);
+    const Result<Vector3> values = told_values(id, of, anchor);
+    if (!values) return Failure(values.error()).in("batch " + batch.id);
+    model.values.segment<3>(anchor.place) = *values;
   }
   return {};
 }

@@ -22,7 +22,9 @@ namespace trammel {
 
 /// Sets the values of the unknown anchors in `model`, from gauges read on their own and the tool
 /// points of the model. It solves the linear equations of the squared distances and refines the
-/// solution. Refuses an anchor with fewer than 4 values, or one whose tool points lie on one line.
+/// solution. A point of contacts is their mean, a plane is the one through its touches. Refuses an
+/// anchor with fewer than 4 values, or one whose tool points lie on one line; a point with one
+/// contact; and a plane more than 60 deg from its stated normal.
 [[nodiscard]] Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch);
 
 /// The point at these distances from tool points.

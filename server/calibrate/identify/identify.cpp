@@ -80,11 +80,26 @@ Status check_positions_belong(const MeasurementBatch& batch, double rms) {
           "error source finds");
 }
 
+/// Checks the same for contacts, whose places have no spread: `rms` (m) is of their residuals.
+Status check_contacts_belong(const MeasurementBatch& batch, double rms) {
+  if (rms < kNoModelError) return {};
+  return refused(
+             "the tool points at one place are {:.0f} mm rms apart after identification, limit {:.0f} "
+             "mm: these joints do not lead to one point",
+             to_mm(rms), to_mm(kNoModelError))
+      .in("batch " + batch.id)
+      .of("distance_mm")
+      .beyond(to_mm(rms), to_mm(kNoModelError))
+      .next(
+          "look at the tool of the cell file, the joints' order, signs and zeros, and which row "
+          "belongs to which point");
+}
+
 /// Checks the same for gauges.
 Status check_gauges_belong(const MeasurementBatch& batch, double rms) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Measurement& m : batch.measurements) {
-    if (!m.gauge) continue;
+    if (!m.gauge || m.gauge->kind == Gauge::Kind::kContact) continue;
     low = std::min(low, m.gauge->value);
     high = std::max(high, m.gauge->value);
   }
@@ -107,8 +122,9 @@ Status check_belongs(const MeasurementBatch& batch, const Residuals& r) {
     const Status gauges = check_gauges_belong(batch, rms_of_most(r.gauge.cwiseAbs2()));
     if (!gauges || r.position.cols() == 0) return gauges;
   }
-  return check_positions_belong(r.gauge.size() > 0 ? positions_of(batch) : batch,
-                                rms_of_most(r.position.colwise().squaredNorm().transpose()));
+  const double rms = rms_of_most(r.position.colwise().squaredNorm().transpose());
+  if (!has_positions(batch)) return check_contacts_belong(batch, rms);
+  return check_positions_belong(has_gauges(batch) ? positions_of(batch) : batch, rms);
 }
 
 /// Adds the observability of the directions: their number, and the least and geometric mean of
@@ -214,7 +230,7 @@ Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, con
   double turns = 0, equations = 0;
   for (const Measurement& m : problem.batch.measurements) {
     turns += !m.gauge && m.R_WT ? 3 : 0;
-    equations += m.gauge ? 1 : m.R_WT ? 6 : 3;
+    equations += m.gauge ? m.gauge->numbers() : m.R_WT ? 6 : 3;
   }
   const double all = freedom_of(at.information) + freedom_of_sessions(problem);
   const double by_number = all * turns / equations;

@@ -105,13 +105,16 @@ AlongJoint of_position(const PhysicalModel& model, const Measurement& m, int joi
           column.squaredNorm() / variance};
 }
 
-/// The effect on a gauge told against another pose, as if the joint did nothing there: enough to
-/// find an order.
+/// The effect on a gauge told against another pose, or from it, as if the joint did nothing there:
+/// enough to find an order.
 AlongJoint of_gauge(const PhysicalModel& model, const Measurement& m, int joint, double residual,
                     double variance) {
-  const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);
-  const GaugedLength length = gauged_length(m.gauge->kind, *anchor.said, anchor.p_W(model.values),
-                                            model.pose_W(m.context).translation());
+  const Vector3 p_W = model.pose_W(m.context).translation();
+  const GaugedLength length =
+      m.gauge->kind == Gauge::Kind::kApart
+          ? length_of(p_W - model.pose_W(*m.gauge->minus).translation())
+          : gauged_length(m.gauge->kind, placed_anchor(model, m.gauge->anchor).at(model.values),
+                          p_W);
   const double column = length.by_point_W.dot(joint_column(model, m.context, joint));
   return {gear_angle(model, m.context, joint), column * residual / variance,
           column * column / variance};

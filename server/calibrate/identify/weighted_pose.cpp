@@ -38,13 +38,19 @@ WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s
 
 bool WeightedPose::evaluate_gauge(const Eigen::VectorXd& values, double* residuals,
                                   double* jacobian) const {
-  Eigen::RowVectorXd J;
-  const double told = predicted_gauge(model_, measurement_.context, *measurement_.gauge, values,
-                                      jacobian != nullptr ? &J : nullptr);
-  *residuals = inverse_sigma_ * (measurement_.gauge->value - told);
-  for (Eigen::Index k = 0; jacobian != nullptr && k < s_.scale.size(); ++k)
-    jacobian[k] = -inverse_sigma_ * s_.scale(k) * J(s_.free[static_cast<std::size_t>(k)]);
-  return std::isfinite(told);
+  const Eigen::Index F = s_.scale.size();
+  Eigen::MatrixXd J;
+  const Eigen::VectorXd told = predicted_gauge(model_, measurement_.context, *measurement_.gauge,
+                                               values, jacobian != nullptr ? &J : nullptr);
+  Eigen::Map<Eigen::VectorXd>(residuals, size()) =
+      inverse_sigma_ * (measurement_.gauge->value - told.array()).matrix();
+  if (jacobian != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
+        jacobian, size(), F);
+    for (Eigen::Index k = 0; k < F; ++k)
+      out.col(k) = -inverse_sigma_ * s_.scale(k) * J.col(s_.free[static_cast<std::size_t>(k)]);
+  }
+  return told.allFinite();
 }
 
 bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian) const {
@@ -75,7 +81,7 @@ bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian
 }
 
 double WeightedPose::huber_limit() const {
-  return measurement_.gauge ? kHuberGauge : measurement_.R_WT ? kHuberPose : kHuberPosition;
+  return size() == 1 ? kHuberGauge : size() == 3 ? kHuberPosition : kHuberPose;
 }
 
 }  // namespace trammel

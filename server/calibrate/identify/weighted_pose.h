@@ -15,8 +15,10 @@ class WeightedPose {
   WeightedPose(const PhysicalModel& model, const ScaledParameters& s,
                const Measurement& measurement, const Weights& weights, std::size_t row = 0);
 
-  /// The number of equations: 6, 3 without an orientation, 1 of a gauge.
-  [[nodiscard]] int size() const { return measurement_.gauge ? 1 : measurement_.R_WT ? 6 : 3; }
+  /// The number of equations: 6, 3 without an orientation, Gauge::numbers() of a gauge.
+  [[nodiscard]] int size() const {
+    return measurement_.gauge ? measurement_.gauge->numbers() : measurement_.R_WT ? 6 : 3;
+  }
   /// At `x` (F): `residuals` (size()), and `jacobian` (size() x F by rows) unless it is null.
   /// False: not finite.
   bool evaluate(const double* x, double* residuals, double* jacobian) const;

@@ -210,11 +210,17 @@ Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch
   Eigen::Index turned = 0, placed = 0, gauged = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    if (m.gauge && m.gauge->kind == Gauge::Kind::kContact) {
+      r.positions.push_back(i);
+      r.sigma(placed) = position_sigma(m, *model.cell);
+      r.position.col(placed++) = -predicted_gauge(model, m.context, *m.gauge, values);
+      continue;
+    }
     if (m.gauge) {
       r.gauges.push_back(i);
       r.sigma_gauge(gauged) = position_sigma(m, *model.cell);
       r.poses_of_gauge(gauged) = gauged_poses(m);
-      r.gauge(gauged++) = m.gauge->value - predicted_gauge(model, m.context, *m.gauge, values);
+      r.gauge(gauged++) = m.gauge->value - predicted_gauge(model, m.context, *m.gauge, values)(0);
       continue;
     }
     const Pose X_WT = model.pose_W(m.context, values, nullptr);

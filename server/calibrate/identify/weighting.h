@@ -36,12 +36,13 @@ struct Weights {
 [[nodiscard]] double rotation_sigma(const Measurement& m, const Cell& cell);
 
 /// The number of poses whose model error enters: 1, or 2 for a gauge that is read against another
-/// pose.
+/// pose or measured from it.
 [[nodiscard]] double gauged_poses(const Measurement& m);
 
-/// Measured - predicted in W, SI. Without gauges column i is of measurement i.
+/// Measured - predicted in W, SI. Without gauges column i is of measurement i. A contact stands among
+/// the positions, because it gives three numbers of one point.
 struct Residuals {
-  Eigen::Matrix3Xd position;  ///< 3 x N, of the measurements that have a position
+  Eigen::Matrix3Xd position;  ///< 3 x N, of the measurements with a position, and of contacts
   Eigen::Matrix3Xd rotation;  ///< 3 x M, rotation vectors of the poses that have an orientation
   Eigen::VectorXd sigma;      ///< N, of the measured positions
   Eigen::VectorXd sigma_rotation;  ///< M, of the measured orientations

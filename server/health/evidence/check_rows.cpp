@@ -58,6 +58,27 @@ Result<Pose> located(const MeasurementBatch& batch,
   return X_WB;
 }
 
+/// True if the tool met one point in all poses, which is the origin of their frame
+/// (about_one_point()).
+bool are_contacts(const MeasurementBatch& batch) {
+  return std::all_of(batch.measurements.begin(), batch.measurements.end(),
+                     [](const Measurement& m) { return m.p_W.isZero(0) && !m.R_WT; });
+}
+
+/// The base with the turn of the model, the point that the tool met at the median of the predicted
+/// places, so that few lost contacts do not move it. The turn of the base changes nothing of such
+/// poses.
+Pose about_the_point(const std::vector<ErrorPrediction>& predictions, const Matrix3& R_WB) {
+  Vector3 met_B;
+  for (Index k = 0; k < 3; ++k) {
+    std::vector<double> along;
+    for (const ErrorPrediction& one : predictions)
+      along.push_back(one.X_BT_predicted.translation()(k));
+    met_B(k) = median(std::move(along));
+  }
+  return make_pose(R_WB, -(R_WB * met_B));
+}
+
 /// True if all poses lie near one place or on one line. Then any error of the poses turns the base.
 bool are_thin(const std::vector<ErrorPrediction>& predictions) {
   Eigen::Matrix3Xd p_B(3, static_cast<Index>(predictions.size()));
@@ -111,6 +132,8 @@ Result<Stand> base_of(const MeasurementBatch& batch,
                       const std::vector<ErrorPrediction>& predictions, bool by_orientations,
                       const Pose& X_WB_of_model) {
   constexpr std::size_t kFewest = 3;  // poses
+  if (are_contacts(batch) && predictions.size() >= kFewest)
+    return Stand{about_the_point(predictions, X_WB_of_model.linear()), false};
   if (predictions.size() < kFewest || !are_thin(predictions))
     return located(batch, predictions).map([](const Pose& X_WB) { return Stand{X_WB}; });
   if (by_orientations) return Stand{turned_by_orientations(batch, predictions)};

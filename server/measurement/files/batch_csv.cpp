@@ -37,7 +37,7 @@ struct BatchColumns {
   std::vector<std::size_t> position, quaternion, extra;
   ThreeColumns three;  // the orientation in these columns or the quaternion
   std::optional<std::size_t> sigma, set, session;
-  std::optional<std::size_t> distance, touch, anchor, minus_pose;
+  std::optional<std::size_t> distance, touch, anchor, minus_pose, from_pose;
 
   [[nodiscard]] bool has_gauges() const { return distance || touch; }
 };
@@ -96,7 +96,8 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
                        table.find("distance_mm"),
                        table.find("touch_mm"),
                        table.find("anchor_id"),
-                       table.find("minus_pose_id")};
+                       table.find("minus_pose_id"),
+                       table.find("from_pose_id")};
   TRY(find_position(table, columns));
   std::vector<std::size_t> quaternion = TRY(table.all_or_none(kQuaternionColumns));
   columns.quaternion = std::move(quaternion);
@@ -113,7 +114,8 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   for (const std::size_t column : columns.quaternion) used[column] = true;
   for (const std::size_t column : columns.three.columns) used[column] = true;
   for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance,
-                             columns.touch, columns.anchor, columns.minus_pose}) {
+                             columns.touch, columns.anchor, columns.minus_pose,
+                             columns.from_pose}) {
     if (column) used[*column] = true;
   }
   for (std::size_t column = 0; column < used.size(); ++column) {
@@ -154,7 +156,32 @@ Status read_position(const CsvTable& table, std::size_t row, const BatchColumns&
   return {};
 }
 
-/// The one number of the row. Refuses a row that also has a position.
+/// Settles what a distance is: to an anchor, from another pose, or, if it is 0, a contact.
+Status read_kind_of_distance(const CsvTable& table, std::size_t row, const BatchColumns& columns,
+                             Gauge& gauge) {
+  if (says(table, row, columns.from_pose)) {
+    for (const auto& [column, name] : {std::pair(columns.anchor, "anchor_id"),
+                                       std::pair(columns.minus_pose, "minus_pose_id")})
+      if (says(table, row, column))
+        return table.refuse(row, "{} beside from_pose_id", name)
+            .of(name)
+            .next("a distance is to an anchor, or from the pose from_pose_id: write a row for each");
+    gauge.kind = Gauge::Kind::kApart;
+    gauge.minus_pose = table.field(row, *columns.from_pose);
+  }
+  if (!gauge.minus_pose.empty() && gauge.kind != Gauge::Kind::kApart) return {};
+  if (gauge.value == 0 && gauge.kind == Gauge::Kind::kDistance) {
+    gauge.kind = Gauge::Kind::kContact;
+  } else if (gauge.value <= 0) {
+    return table.refuse(row, "distance_mm is {:g}, must be above 0", to_mm(gauge.value))
+        .of("distance_mm")
+        .beyond(to_mm(gauge.value), 0)
+        .next("0 with an anchor_id says that the tip met that point");
+  }
+  return {};
+}
+
+/// The number of the row. Refuses a row that also has a position.
 Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColumns& columns) {
   const bool distance = says(table, row, columns.distance);
   const char* name = distance ? "distance_mm" : "touch_mm";
@@ -176,14 +203,12 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
   }
   if (says(table, row, columns.minus_pose))
     gauge.minus_pose = table.field(row, *columns.minus_pose);
-  if (distance && gauge.minus_pose.empty() && gauge.value <= 0)
-    return table.refuse(row, "distance_mm is {:g}, must be above 0", value)
-        .of(name)
-        .beyond(value, 0)
-        .next(
-            "a tip that was brought to one fixed point tells x, y and z, and no distance: write "
-            "x_mm, y_mm and z_mm, all 0, in its place, and in the cell file base: null and null "
-            "for the tool");
+  if (distance) {
+    TRY(read_kind_of_distance(table, row, columns, gauge));
+  } else if (says(table, row, columns.from_pose)) {
+    return table.refuse(row, "from_pose_id beside touch_mm").of("from_pose_id").next(
+        "a distance from another pose is a distance_mm");
+  }
   return gauge;
 }
 
@@ -203,9 +228,10 @@ Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& co
 Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns& columns,
                      Measurement& measurement) {
   const bool gauged = says(table, row, columns.distance) || says(table, row, columns.touch);
-  if (!gauged && says(table, row, columns.minus_pose))
-    return table.refuse(row, "minus_pose_id is told, but neither distance_mm nor touch_mm")
-        .of("minus_pose_id");
+  for (const auto& [column, name] : {std::pair(columns.minus_pose, "minus_pose_id"),
+                                     std::pair(columns.from_pose, "from_pose_id")})
+    if (!gauged && says(table, row, column))
+      return table.refuse(row, "{} is told, but neither distance_mm nor touch_mm", name).of(name);
   if (gauged) {
     Gauge gauge = TRY(read_gauge(table, row, columns));
     measurement.gauge = std::move(gauge);
@@ -254,7 +280,9 @@ Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& 
     if (!m.gauge || m.gauge->minus_pose.empty()) continue;
     const std::string& other = m.gauge->minus_pose;
     const auto fail = [&](Failure why) {
-      return std::move(why).in(batch.where).at_row(m.row).of("minus_pose_id");
+      const bool apart = m.gauge->kind == Gauge::Kind::kApart;
+      return std::move(why).in(batch.where).at_row(m.row).of(apart ? "from_pose_id"
+                                                                   : "minus_pose_id");
     };
     if (!line_of_pose.contains(other))
       return fail(refused("no row has the pose_id '{}'", other).with_text(other));

@@ -51,20 +51,27 @@ void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>&
 }
 
 void add_gauge_columns(std::vector<WrittenColumn>& columns) {
-  const auto add = [&](const char* name, Gauge::Kind kind) {
-    columns.push_back({name, [kind](const Measurement& m) {
-                         return m.gauge && m.gauge->kind == kind ? csv_number(to_mm(m.gauge->value))
-                                                                 : "";
+  const auto add = [&](const char* name, bool touches) {
+    columns.push_back({name, [touches](const Measurement& m) {
+                         return m.gauge && (m.gauge->kind == Gauge::Kind::kTouch) == touches
+                                    ? csv_number(to_mm(m.gauge->value))
+                                    : "";
                        }});
   };
-  add("distance_mm", Gauge::Kind::kDistance);
-  add("touch_mm", Gauge::Kind::kTouch);
+  add("distance_mm", false);
+  add("touch_mm", true);
   columns.push_back({"anchor_id", [](const Measurement& m) {
                        return m.gauge ? csv_field(m.gauge->anchor) : "";
                      }});
-  columns.push_back({"minus_pose_id", [](const Measurement& m) {
-                       return m.gauge ? csv_field(m.gauge->minus_pose) : "";
-                     }});
+  const auto add_other = [&](const char* name, bool apart) {
+    columns.push_back({name, [apart](const Measurement& m) {
+                         return m.gauge && (m.gauge->kind == Gauge::Kind::kApart) == apart
+                                    ? csv_field(m.gauge->minus_pose)
+                                    : "";
+                       }});
+  };
+  add_other("minus_pose_id", false);
+  add_other("from_pose_id", true);
 }
 
 void add_circumstance_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>& columns) {
