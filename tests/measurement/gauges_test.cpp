@@ -71,16 +71,49 @@ TEST(Gauges, ARowThatIsTwoThingsOrNothingIsRefused) {
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,,,a1,\n"), Refusal("wires.csv", 2, "distance_mm"));
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,-5,,a1,\n"),
             Refusal("wires.csv", 2, "distance_mm").beyond(-5, 0));
-  const auto spike = parse_batch_csv(head + "a,1,,,,0,,a1,\n", "wires.csv");
-  ASSERT_FALSE(spike);
-  EXPECT_NE(spike.error().next.find("write x_mm, y_mm and z_mm, all 0"), std::string::npos)
-      << "a tip on a fixed point: " << spike.error().next;
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,,a1,b\n"),
             Refusal("wires.csv", 2, "minus_pose_id").text("b"));
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,5,,a1,a\n"),
             Refusal("wires.csv", 2, "minus_pose_id").text("a"));
   EXPECT_EQ(refusal_gauges(head + "a,1,1,2,3,,,,a\n"), Refusal("wires.csv", 2, "minus_pose_id"));
   EXPECT_FALSE(parse_batch_csv(head + "a,1,1,2,,,,,\n", "wires.csv")) << "a part of a position";
+}
+
+constexpr const char* kPlaceless =
+    "pose_id,q1_deg,distance_mm,anchor_id,minus_pose_id,from_pose_id\n"
+    "met,10,0,spike,,\n"
+    "hole,15,,,,\n"
+    "bar,20,500.02,,,hole\n"
+    "same,30,0,a1,met,\n";
+
+TEST(Gauges, ATipOnASpikeAndABarBetweenTwoPosesAreRowsAndAreWrittenAsTheyWereRead) {
+  const MeasurementBatch read = test::demand(parse_batch_csv(kPlaceless, "spike.csv"));
+  for (const MeasurementBatch& batch :
+       {read, test::demand(parse_batch_csv(to_csv(read), "spike.csv"))}) {
+    ASSERT_EQ(batch.measurements.size(), 3U) << "the hole alone is no measurement";
+    EXPECT_EQ(batch.measurements[0].gauge->kind, Gauge::Kind::kContact);
+    EXPECT_EQ(batch.measurements[0].gauge->numbers(), 3);
+    const Gauge& bar = *batch.measurements[1].gauge;
+    EXPECT_EQ(bar.kind, Gauge::Kind::kApart);
+    EXPECT_EQ(bar.minus_pose, "hole");
+    ASSERT_TRUE(bar.minus);
+    EXPECT_NEAR(bar.value, 0.50002, 1e-12);
+    EXPECT_EQ(batch.measurements[2].gauge->kind, Gauge::Kind::kDistance)
+        << "a difference of 0 is no contact";
+  }
+}
+
+TEST(Gauges, ABarThatIsTwoThingsOrNothingIsRefused) {
+  const std::string head = "pose_id,q1_deg,distance_mm,touch_mm,anchor_id,from_pose_id\n";
+  const std::string other = "b,2,0,,spike,\n";
+  EXPECT_EQ(refusal_gauges(head + "a,1,500,,spike,b\n" + other),
+            Refusal("wires.csv", 2, "anchor_id"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,3,,b\n" + other), Refusal("wires.csv", 2, "from_pose_id"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,0,,,b\n" + other),
+            Refusal("wires.csv", 2, "distance_mm").beyond(0, 0));
+  EXPECT_EQ(refusal_gauges(head + "a,1,500,,,c\n" + other),
+            Refusal("wires.csv", 2, "from_pose_id").text("c"));
+  EXPECT_EQ(refusal_gauges(head + "a,1,,,,b\n" + other), Refusal("wires.csv", 2, "from_pose_id"));
 }
 
 Cell cell_with(const std::string& anchors) {
@@ -125,7 +158,8 @@ TEST(Gauges, AnchorsThatMakeNoSenseAreRefused) {
   EXPECT_TRUE(refused_cell("{a: {xyz: [1, 2, 3]}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2]}}"));
   EXPECT_TRUE(refused_cell("{a: {sphere_radius_mm: 0}}"));
-  EXPECT_TRUE(refused_cell("{a: {xyz_mm: null, plane_normal: [0, 0, 1]}}"));
+  EXPECT_FALSE(refused_cell("{a: {xyz_mm: null, plane_normal: [0, 0, 1]}}"));
+  EXPECT_TRUE(refused_cell("{a: {xyz_mm: null, ring_axis: [0, 0, 1], ring_radius_mm: 25}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2, 3], plane_normal: [0, 0, 0]}}"));
   EXPECT_TRUE(refused_cell("{a: {xyz_mm: [1, 2, 3], ring_axis: [0, 0, 1]}}"));
   EXPECT_TRUE(

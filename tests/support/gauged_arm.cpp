@@ -125,11 +125,65 @@ std::vector<GaugeRow> position_rows(const GaugedArm& arm, int count, std::uint64
   return rows;
 }
 
+hidden::MeasuringPose contact_pose(const hidden::Arm& arm, const hidden::World& world,
+                                   const Eigen::Vector3d& p_mm, hidden::Random& random) {
+  constexpr double kStep = 1e-6, kLongest = 0.3;  // rad
+  const auto ranges = hidden::joint_ranges("calibration");
+  for (;;) {
+    hidden::MeasuringPose pose;
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      const auto& range = ranges[static_cast<std::size_t>(j)];
+      pose.q(j) = hidden::uniform(random, range.first, range.second);
+    }
+    for (int k = 0; k < 40; ++k) {
+      const Eigen::Vector3d at = point_of(arm, world, pose);
+      Eigen::Matrix<double, 3, 6> J;
+      for (Eigen::Index j = 0; j < 6; ++j) {
+        hidden::MeasuringPose moved = pose;
+        moved.q(j) += kStep;
+        J.col(j) = (point_of(arm, world, moved) - at) / kStep;
+      }
+      const Eigen::Matrix3d square = J * J.transpose();
+      const Eigen::VectorXd step = J.transpose() * square.ldlt().solve(p_mm - at);
+      pose.q += step * std::min(1.0, kLongest / std::max(1e-12, step.norm()));
+    }
+    bool reached = (point_of(arm, world, pose) - p_mm).norm() < 1e-6;
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      const auto& range = ranges[static_cast<std::size_t>(j)];
+      reached = reached && pose.q(j) > range.first && pose.q(j) < range.second;
+    }
+    if (reached) return pose;
+  }
+}
+
+std::vector<GaugeRow> contact_rows(const GaugedArm& arm, const std::string& id, int count,
+                                   double sigma_mm, std::uint64_t seed) {
+  hidden::Random random(seed * 6151 + 13);
+  std::vector<GaugeRow> rows;
+  while (static_cast<int>(rows.size()) < count) {
+    Eigen::Vector3d met = arm.anchors_mm.at(id);
+    for (double& x : met) x += sigma_mm * hidden::normal(random);
+    rows.push_back(
+        {contact_pose(arm.world.arm, arm.world, met, random), id, "distance_mm", 0, "", {0, 0, 0}});
+  }
+  return rows;
+}
+
+void add_bar(const GaugedArm& arm, double length_mm, std::uint64_t seed,
+             std::vector<GaugeRow>& rows) {
+  hidden::Random random(seed * 3571 + 17);
+  const Eigen::Vector3d from = point_of(arm.world.arm, arm.world, rows.front().pose);
+  const hidden::MeasuringPose pose = contact_pose(
+      arm.world.arm, arm.world, from + length_mm * Eigen::Vector3d(0, 1, 0), random);
+  const double apart = (point_of(arm.world.arm, arm.world, pose) - from).norm();
+  rows.push_back({pose, "", "distance_mm", apart, "", {0, 0, 0}, "p1"});
+}
+
 std::string gauge_text(const std::vector<GaugeRow>& rows, double sigma_mm, std::uint64_t seed) {
   hidden::Random random(seed * 104729 + 11);
   std::string text =
       "pose_id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,distance_mm,touch_mm,"
-      "anchor_id,minus_pose_id,sigma_mm\n";
+      "anchor_id,minus_pose_id,from_pose_id,sigma_mm\n";
   int id = 0;
   for (const GaugeRow& row : rows) {
     text += fmt::format("p{}", ++id);
@@ -137,12 +191,13 @@ std::string gauge_text(const std::vector<GaugeRow>& rows, double sigma_mm, std::
     if (row.column.empty()) {
       for (const double x : row.p_mm)
         text += fmt::format(",{:.7f}", x + sigma_mm * hidden::normal(random));
-      text += ",,,,";
+      text += ",,,,,";
     } else {
-      const double value = row.value_mm + sigma_mm * hidden::normal(random);
+      const bool is_contact = row.column == "distance_mm" && row.value_mm == 0;
+      const double value = is_contact ? 0 : row.value_mm + sigma_mm * hidden::normal(random);
       text += row.column == "distance_mm" ? fmt::format(",,,,{:.7f},,{}", value, row.anchor)
                                           : fmt::format(",,,,,{:.7f},{}", value, row.anchor);
-      text += "," + row.minus_pose;
+      text += "," + row.minus_pose + "," + row.from_pose;
     }
     text += fmt::format(",{:.6g}\n", sigma_mm);
   }
@@ -182,9 +237,21 @@ double least_volumetric_mm(const GaugedArm& arm, const std::vector<GaugeRow>& ro
   Eigen::MatrixXd information = Eigen::MatrixXd::Identity(P + places, P + places);
   for (const GaugeRow& row : rows) {
     const Eigen::MatrixXd columns = point_columns(arm, row.pose);
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(row.column.empty() ? 3 : 1, P + places);
-    if (row.column.empty()) {
+    const bool is_contact = row.column == "distance_mm" && row.value_mm == 0;
+    const bool is_point = row.column.empty() || is_contact;
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(is_point ? 3 : 1, P + places);
+    if (is_point) {
       J.leftCols(P) = columns;
+      const auto anchor = arm.anchors_mm.find(row.anchor);
+      if (is_contact && !known)
+        J.block<3, 3>(0, P + 3 * std::distance(arm.anchors_mm.begin(), anchor)) =
+            -kAnywhere * Eigen::Matrix3d::Identity();
+    } else if (!row.from_pose.empty()) {
+      const auto other = static_cast<std::size_t>(std::stoi(row.from_pose.substr(1)) - 1);
+      const Eigen::Vector3d d = point_of(arm.world.arm, arm.world, row.pose) -
+                                point_of(arm.world.arm, arm.world, rows[other].pose);
+      J.leftCols(P) =
+          d.normalized().transpose() * (columns - point_columns(arm, rows[other].pose));
     } else {
       const auto anchor = arm.anchors_mm.find(row.anchor);
       const Eigen::RowVector3d u =

@@ -38,13 +38,24 @@ struct GaugeRow {
   double value_mm = 0;     ///< without noise
   std::string minus_pose;  ///< id of a row
   Eigen::Vector3d p_mm = {0, 0, 0};
+  std::string from_pose = {};  ///< id of a row: a distance from its tool point
 };
 /// `count` poses with the tool 0.3 to 3 m from their anchor; the anchors take turns.
 [[nodiscard]] std::vector<GaugeRow> wire_rows(const GaugedArm& arm, int count, std::uint64_t seed,
                                               double zero_mm = 0);
 [[nodiscard]] std::vector<GaugeRow> position_rows(const GaugedArm& arm, int count,
                                                   std::uint64_t seed);
-/// With noise of `sigma_mm`; ids p1, p2, ...
+/// A random posture in which the tip of `arm` is at `p_mm`.
+[[nodiscard]] hidden::MeasuringPose contact_pose(const hidden::Arm& arm, const hidden::World& world,
+                                                 const Eigen::Vector3d& p_mm,
+                                                 hidden::Random& random);
+/// `count` contacts with the anchor `id`, missed by `sigma_mm` in each direction.
+[[nodiscard]] std::vector<GaugeRow> contact_rows(const GaugedArm& arm, const std::string& id,
+                                                 int count, double sigma_mm, std::uint64_t seed);
+/// Adds to `rows` a distance of about `length_mm` from the first of them.
+void add_bar(const GaugedArm& arm, double length_mm, std::uint64_t seed,
+             std::vector<GaugeRow>& rows);
+/// With noise of `sigma_mm`, but for contacts, whose noise is in their postures; ids p1, p2, ...
 [[nodiscard]] std::string gauge_text(const std::vector<GaugeRow>& rows, double sigma_mm,
                                      std::uint64_t seed);
 [[nodiscard]] MeasurementBatch gauge_batch(const GaugedArm& arm, const std::vector<GaugeRow>& rows,

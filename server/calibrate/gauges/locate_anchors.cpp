@@ -153,7 +153,10 @@ bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batc
   return !batch.measurements.empty() &&
          std::all_of(
              batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
-               if (!m.gauge || m.gauge->kind != Gauge::Kind::kTouch || m.gauge->minus) return false;
+               if (!m.gauge || m.gauge->minus) return false;
+               if (m.gauge->kind == Gauge::Kind::kContact)
+                 return m.gauge->anchor == batch.measurements.front().gauge->anchor;
+               if (m.gauge->kind != Gauge::Kind::kTouch) return false;
                const Anchor* said = placed_anchor(model, m.gauge->anchor).said;
                const bool is_point =
                    said->shape == Anchor::Shape::kPoint || said->shape == Anchor::Shape::kSphere;
