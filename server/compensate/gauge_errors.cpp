@@ -53,7 +53,8 @@ struct AskedGauge {
   }
 };
 
-/// The derivative of the gauge's numbers by the tool point of pose `k`, up to its sign: numbers x 3.
+/// The derivative of the gauge's numbers by the tool point of pose `k`, up to its sign: numbers
+/// x 3.
 Eigen::MatrixXd by_tool_point(const PhysicalModel& physics, const AskedGauge& asked,
                               std::size_t k) {
   const auto p_W = [&](std::size_t of) -> Vector3 {
@@ -92,9 +93,9 @@ Eigen::VectorXd variance_without_bias(const Gauging& gauging, const ModelParts& 
   const Domain domain{parts.q_min, parts.q_max, parts.prior_share_limit};
   Eigen::VectorXd variance = (J * gauging.covariance * J.transpose()).diagonal();
   for (const PoseContext& pose : asked.poses)
-    variance.array() += std::pow(parts.discrepancy, 2) +
-                        domain.growth(pose.q, parts.extrapolation_slope,
-                                      gauging.physics.cell->robot);
+    variance.array() +=
+        std::pow(parts.discrepancy, 2) +
+        domain.growth(pose.q, parts.extrapolation_slope, gauging.physics.cell->robot);
   return variance;
 }
 
@@ -135,9 +136,8 @@ CompensatedModel::GaugeErrors CompensatedModel::gauge_errors(const MeasurementBa
     const Eigen::VectorXd calibrated =
         residual(predicted_gauge(physics, asked.poses[0], asked.gauge, physics.values, &J));
     const bool biased = static_cast<bool>(inside_->bias);
-    const Eigen::VectorXd variance = biased
-                                         ? variance_with_bias(physics, asked)
-                                         : variance_without_bias(gauging, parts(), asked, J);
+    const Eigen::VectorXd variance = biased ? variance_with_bias(physics, asked)
+                                            : variance_without_bias(gauging, parts(), asked, J);
     const double noise = std::pow(m.sigma.value_or(cell().tracker.sigma), 2);
     append(errors.nominal, at(&ErrorPrediction::X_BT_nominal));
     append(errors.calibrated, calibrated);

@@ -24,8 +24,8 @@ namespace trammel {
 /// Resolves anchors, tools and payloads of the gauges, and gives a value without a sigma that of
 /// its instrument. A point of contacts need not be in the cell file: a check needs no place of it.
 /// Refuses another anchor that the cell file does not have, a touch of a point, a contact with a
-/// surface, a reference pose with joints that the robot cannot have, and a missing anchor name if the cell has
-/// several anchors. The caller adds file and row to errors.
+/// surface, a reference pose with joints that the robot cannot have, and a missing anchor name if
+/// the cell has several anchors. The caller adds file and row to errors.
 [[nodiscard]] Status check_gauge(Measurement& measurement, const Cell& cell,
                                  const Anchors& anchors);
 

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "server/plan/approach.h"
+#include "server/plan/contact_posture.h"
 #include "server/plan/optimal_design.h"
 #include "server/plan/visibility.h"
 #include "server/robot/passive_joint.h"
@@ -114,7 +115,8 @@ struct Drawn {
 
 /// `wanted` joint vectors that pass the filter, from a Latin hypercube. The hypercube doubles until
 /// it is large enough, up to `largest_factor` times as many as wanted. Refuses if even the largest
-/// one has fewer than `needed`. `ways_of` gives the approaches of the next one, by its number.
+/// one has fewer than `needed`. `prepare` gives the joints to try in place of the drawn ones, if
+/// there are any. `ways_of` gives the approaches of the next one, by its number.
 template <typename Prepare, typename WaysOf>
 Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed,
                    int largest_factor, std::uint64_t seed, const Prepare& prepare,
@@ -132,8 +134,14 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
         ++drawn.count.no_way;
         continue;
       }
-      q = prepare(std::move(q));
-      if (filter.keeps(q, ways_of(q, drawn.q.size()), drawn.count)) drawn.q.push_back(std::move(q));
+      std::optional<JointVector> prepared = prepare(std::move(q));
+      if (!prepared) {
+        ++drawn.count.drawn;
+        ++drawn.count.no_way;
+        continue;
+      }
+      if (filter.keeps(*prepared, ways_of(*prepared, drawn.q.size()), drawn.count))
+        drawn.q.push_back(std::move(*prepared));
     }
   }
   const DrawCount& count = drawn.count;
@@ -336,6 +344,18 @@ Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
   return plan;
 }
 
+/// The drawn joints as a program has them, with the tip at the point of contact if there is one.
+std::optional<JointVector> planned_joints(const Planning& planning, const PlanOptions& options,
+                                          JointVector q) {
+  const Chain& robot = planning.cell->robot;
+  if (!options.contact_B) return on_program_grid(robot, std::move(q));
+  const std::optional<Pose>& X_FT = planning.cell->tools.at(planning.tools.front());
+  const Vector3 p_F = X_FT ? Vector3(X_FT->translation()) : Vector3::Zero();
+  std::optional<JointVector> met = contact_posture(robot, p_F, *options.contact_B, std::move(q));
+  if (!met) return std::nullopt;
+  return on_program_grid(robot, std::move(*met));
+}
+
 }  // namespace
 
 Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options) {
@@ -381,13 +401,16 @@ Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOption
   if (options.one_way && options.bidirectional)
     return failure(ErrorCode::kUsage, "each pose from both sides, and one way").of("--one-way");
   const auto tools = TRY(resolved(*cell, options.tools, resolve_tool));
+  if (options.contact_B && tools.size() > 1)
+    return failure(ErrorCode::kUsage, "contacts are planned for one tool, not {}", tools.size())
+        .of("--tool");
   const auto payloads = TRY(resolved(*cell, options.payloads, resolve_payload));
   const Planning planning{cell, tools, payloads, options.bidirectional, options.one_way};
   const Filter filter = TRY(Filter::of(*cell, planning.tools));
   const auto drawn = [&](int wanted, int largest_factor) {
     return draw(
         *cell, filter, wanted, options.count, largest_factor, options.seed,
-        [&](JointVector q) { return on_program_grid(cell->robot, std::move(q)); },
+        [&](JointVector q) { return planned_joints(planning, options, std::move(q)); },
         [&](const JointVector& q, std::size_t number) { return planning.ways(q, number); });
   };
   const Drawn latin_hypercube = TRY(drawn(options.count, kLargestFactor));

@@ -49,6 +49,9 @@ struct PlanOptions {
   std::vector<std::string> payloads = {};
   bool one_way = false;  ///< all joints come to each pose from below: play in the gears does not
                          ///< show, and costs no extra travel
+  /// m: the tip of the first tool meets this point in every pose, in varied postures. A base among
+  /// the error sources stands for the unknown place of the point. Use with `orientation` false.
+  std::optional<Vector3> contact_B = std::nullopt;
 };
 
 /// `count` poses of the cell (rows, rad) from a Latin hypercube, keeping the ones inside the

@@ -23,7 +23,7 @@ struct Anchor {
   /// Unit vector: normal of the plane, away from its body; axis of the ring. Of a plane of unknown
   /// place its rough direction: the attitude is then unknown, too.
   Vector3 direction_W = Vector3::UnitZ();
-  double radius = 0;     ///< m, of sphere or ring
+  double radius = 0;            ///< m, of sphere or ring
   std::optional<double> sigma;  ///< m, of one reading of this instrument
   std::optional<double> zero;   ///< m: the offset of the readings; empty: calibration identifies it
   bool zero_open = false;  ///< true: the zero is certainly unknown; false: the data decide whether

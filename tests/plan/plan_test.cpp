@@ -52,6 +52,25 @@ TEST(Plan, KeepsToTheWorkspace) {
   EXPECT_FALSE(plan_poses(cell, {0, 1}));
 }
 
+TEST(Plan, OfContactsBringsTheTipToOnePointInVariedPostures) {
+  const auto cell = test::cell_7();
+  PlanOptions options{12, 1};
+  options.criterion = PlanCriterion::kObservability;
+  options.orientation = false;
+  options.contact_B = Vector3(1.5, 0.2, 1.1);
+  const Plan plan = test::demand(make_plan(cell, options));
+  ASSERT_EQ(plan.poses.size(), 12U);
+  double least = 10, most = -10;
+  for (const PlannedPose& pose : plan.poses) {
+    const Vector3 p =
+        (cell->robot.flange_pose(pose.context.q) * *cell->tools.at("spindle")).translation();
+    EXPECT_LT((p - *options.contact_B).norm(), 0.1e-3) << pose.id;
+    least = std::min(least, pose.context.q(4));
+    most = std::max(most, pose.context.q(4));
+  }
+  EXPECT_GT(most - least, 0.5) << "rad of joint 5";
+}
+
 /// A palletiser: bars keep the wrist level.
 Cell palletiser() {
   const test::TemporaryFolder folder;

@@ -173,8 +173,8 @@ void add_bar(const GaugedArm& arm, double length_mm, std::uint64_t seed,
              std::vector<GaugeRow>& rows) {
   hidden::Random random(seed * 3571 + 17);
   const Eigen::Vector3d from = point_of(arm.world.arm, arm.world, rows.front().pose);
-  const hidden::MeasuringPose pose = contact_pose(
-      arm.world.arm, arm.world, from + length_mm * Eigen::Vector3d(0, 1, 0), random);
+  const hidden::MeasuringPose pose =
+      contact_pose(arm.world.arm, arm.world, from + length_mm * Eigen::Vector3d(0, 1, 0), random);
   const double apart = (point_of(arm.world.arm, arm.world, pose) - from).norm();
   rows.push_back({pose, "", "distance_mm", apart, "", {0, 0, 0}, "p1"});
 }
@@ -250,8 +250,7 @@ double least_volumetric_mm(const GaugedArm& arm, const std::vector<GaugeRow>& ro
       const auto other = static_cast<std::size_t>(std::stoi(row.from_pose.substr(1)) - 1);
       const Eigen::Vector3d d = point_of(arm.world.arm, arm.world, row.pose) -
                                 point_of(arm.world.arm, arm.world, rows[other].pose);
-      J.leftCols(P) =
-          d.normalized().transpose() * (columns - point_columns(arm, rows[other].pose));
+      J.leftCols(P) = d.normalized().transpose() * (columns - point_columns(arm, rows[other].pose));
     } else {
       const auto anchor = arm.anchors_mm.find(row.anchor);
       const Eigen::RowVector3d u =

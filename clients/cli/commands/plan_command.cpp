@@ -27,7 +27,8 @@ struct PlanArguments {
   PlanOptions options;
   ProgramOptions program;
   bool positions_only = false, keep_order = false;
-  int check = 0;  // poses of a check; 0: no check is planned
+  int check = 0;                   // poses of a check; 0: no check is planned
+  std::vector<double> contact_mm;  // in B; empty: none
 
   [[nodiscard]] bool writes_program() const {
     return !(rapid.empty() && krl.empty() && fanuc.empty() && urscript.empty());
@@ -207,7 +208,10 @@ Status plan(PlanArguments arguments) {
     arguments.options.criterion = PlanCriterion::kCheck;
     arguments.options.count = arguments.check;
   }
-  arguments.options.orientation = !arguments.positions_only;
+  const std::vector<double>& contact = arguments.contact_mm;
+  if (!contact.empty())
+    arguments.options.contact_B = from_mm(1) * Vector3(contact[0], contact[1], contact[2]);
+  arguments.options.orientation = !arguments.positions_only && contact.empty();
   Cell read = TRY(read_cell_to_train(arguments.cell, {.bias = false}));
   const auto cell = std::make_shared<const Cell>(std::move(read));
   Result<Plan> planned = arguments.from.empty() ? make_plan(cell, arguments.options)
@@ -298,6 +302,13 @@ void add_plan_command(CLI::App& app, Action& chosen) {
       ->excludes("--from");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Choose for a single reflector, which shows no orientations");
+  command
+      ->add_option("--contact-mm", arguments->contact_mm,
+                   "Point x,y,z in the robot's base that the tip meets in all poses (a spike): "
+                   "approach it by hand, these poses keep no distance from it")
+      ->delimiter(',')
+      ->expected(3)
+      ->excludes("--from");
   command
       ->add_option("--tool", options.tools,
                    "Tool id of the cell; several, joined by commas, are planned for in turn")

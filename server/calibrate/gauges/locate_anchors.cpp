@@ -29,7 +29,7 @@ constexpr double kLastStep = 1e-9;  // m
 /// The lengths measured to one anchor.
 struct Lengths {
   std::vector<Vector3> points_W;
-  std::vector<double> lengths;  ///< m, from the anchor's point, or above its plane
+  std::vector<double> lengths;           ///< m, from the anchor's point, or above its plane
   std::vector<Vector3> contacts_W = {};  ///< tool points that met the anchor's point
 };
 

@@ -84,7 +84,8 @@ Status check_positions_belong(const MeasurementBatch& batch, double rms) {
 Status check_contacts_belong(const MeasurementBatch& batch, double rms) {
   if (rms < kNoModelError) return {};
   return refused(
-             "the tool points at one place are {:.0f} mm rms apart after identification, limit {:.0f} "
+             "the tool points at one place are {:.0f} mm rms apart after identification, limit "
+             "{:.0f} "
              "mm: these joints do not lead to one point",
              to_mm(rms), to_mm(kNoModelError))
       .in("batch " + batch.id)

@@ -39,8 +39,8 @@ struct Weights {
 /// pose or measured from it.
 [[nodiscard]] double gauged_poses(const Measurement& m);
 
-/// Measured - predicted in W, SI. Without gauges column i is of measurement i. A contact stands among
-/// the positions, because it gives three numbers of one point.
+/// Measured - predicted in W, SI. Without gauges column i is of measurement i. A contact stands
+/// among the positions, because it gives three numbers of one point.
 struct Residuals {
   Eigen::Matrix3Xd position;  ///< 3 x N, of the measurements with a position, and of contacts
   Eigen::Matrix3Xd rotation;  ///< 3 x M, rotation vectors of the poses that have an orientation

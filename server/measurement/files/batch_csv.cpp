@@ -113,9 +113,9 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   for (const std::size_t column : columns.position) used[column] = true;
   for (const std::size_t column : columns.quaternion) used[column] = true;
   for (const std::size_t column : columns.three.columns) used[column] = true;
-  for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance,
-                             columns.touch, columns.anchor, columns.minus_pose,
-                             columns.from_pose}) {
+  for (const auto& column :
+       {columns.sigma, columns.set, columns.session, columns.distance, columns.touch,
+        columns.anchor, columns.minus_pose, columns.from_pose}) {
     if (column) used[*column] = true;
   }
   for (std::size_t column = 0; column < used.size(); ++column) {
@@ -160,12 +160,13 @@ Status read_position(const CsvTable& table, std::size_t row, const BatchColumns&
 Status read_kind_of_distance(const CsvTable& table, std::size_t row, const BatchColumns& columns,
                              Gauge& gauge) {
   if (says(table, row, columns.from_pose)) {
-    for (const auto& [column, name] : {std::pair(columns.anchor, "anchor_id"),
-                                       std::pair(columns.minus_pose, "minus_pose_id")})
+    for (const auto& [column, name] :
+         {std::pair(columns.anchor, "anchor_id"), std::pair(columns.minus_pose, "minus_pose_id")})
       if (says(table, row, column))
         return table.refuse(row, "{} beside from_pose_id", name)
             .of(name)
-            .next("a distance is to an anchor, or from the pose from_pose_id: write a row for each");
+            .next(
+                "a distance is to an anchor, or from the pose from_pose_id: write a row for each");
     gauge.kind = Gauge::Kind::kApart;
     gauge.minus_pose = table.field(row, *columns.from_pose);
   }
@@ -206,8 +207,9 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
   if (distance) {
     TRY(read_kind_of_distance(table, row, columns, gauge));
   } else if (says(table, row, columns.from_pose)) {
-    return table.refuse(row, "from_pose_id beside touch_mm").of("from_pose_id").next(
-        "a distance from another pose is a distance_mm");
+    return table.refuse(row, "from_pose_id beside touch_mm")
+        .of("from_pose_id")
+        .next("a distance from another pose is a distance_mm");
   }
   return gauge;
 }
@@ -281,8 +283,10 @@ Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& 
     const std::string& other = m.gauge->minus_pose;
     const auto fail = [&](Failure why) {
       const bool apart = m.gauge->kind == Gauge::Kind::kApart;
-      return std::move(why).in(batch.where).at_row(m.row).of(apart ? "from_pose_id"
-                                                                   : "minus_pose_id");
+      return std::move(why)
+          .in(batch.where)
+          .at_row(m.row)
+          .of(apart ? "from_pose_id" : "minus_pose_id");
     };
     if (!line_of_pose.contains(other))
       return fail(refused("no row has the pose_id '{}'", other).with_text(other));
