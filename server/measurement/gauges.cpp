@@ -75,7 +75,10 @@ Status require_positions(const MeasurementBatch& batch, const std::string& who) 
       .in(batch.where.empty() ? "batch " + batch.id : batch.where)
       .at_row(gauged->row)
       .of(column)
-      .next("distances and touches are for train --bias none, and for evaluate");
+      .next(
+          "distances, touches and contacts are for train --bias none, and for evaluate; contacts "
+          "with "
+          "one point alone also for check");
 }
 
 Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& anchors) {

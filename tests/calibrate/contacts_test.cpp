@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
+#include "server/calibrate/gauges/gauge_doubt.h"
 #include "server/calibrate/identify/weighted_pose.h"
 #include "server/error_sources/anchors.h"
 #include "tests/support/demand.h"
@@ -122,6 +123,29 @@ TEST(Gauges, ATableThatNobodyMeasuredIsFoundByItsTouches) {
   EXPECT_TRUE(std::none_of(found->parameters.begin(), found->parameters.end(), [](const auto& one) {
     return one.parameter.name == "zero[table]";
   })) << "the offset has it";
+}
+
+TEST(Gauges, ABarInInchesIsDoubtedAndOneInMillimetresIsNot) {
+  const test::GaugedArm arm = test::gauged_arm(3, kSpike, test::unknown_places(kSpike));
+  std::vector<test::GaugeRow> rows = test::contact_rows(arm, "spike", 4, kNoiseOfContacts, 3);
+  test::add_bar(arm, 800, 3, rows);
+  EXPECT_FALSE(gauge_doubt(test::gauge_batch(arm, rows, kNoiseOfContacts, 3), *arm.cell));
+  rows.back().value_mm /= 25.4;
+  const auto doubt = gauge_doubt(test::gauge_batch(arm, rows, 0.001, 3), *arm.cell);
+  ASSERT_TRUE(doubt);
+  EXPECT_NE(doubt->message.find("inch"), std::string::npos) << doubt->message;
+}
+
+TEST(Gauges, OneContactAndAPointThatTheCellDoesNotHaveAreRefusedByTraining) {
+  const test::GaugedArm arm = test::gauged_arm(3, kSpike, test::unknown_places(kSpike));
+  std::vector<test::GaugeRow> rows = test::contact_rows(arm, "spike", 1, kNoiseOfContacts, 3);
+  const auto once = calibrate(arm.cell, kArmOfContacts, test::gauge_batch(arm, rows, 0.05, 3), {});
+  ASSERT_FALSE(once);
+  EXPECT_NE(once.error().message.find("met it once"), std::string::npos) << once.error().message;
+  rows.front().anchor = "another";
+  const auto other = calibrate(arm.cell, kArmOfContacts, test::gauge_batch(arm, rows, 0.05, 3), {});
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().message.find("no anchor 'another'"), std::string::npos);
 }
 
 }  // namespace

@@ -22,8 +22,8 @@ std::vector<std::string> optional_columns(TableKind kind) {
   if (kind == TableKind::kTargets) return names;
   names.insert(names.end(), {"pose_id", "tool_id", "payload_id"});
   if (kind == TableKind::kJoints) return names;
-  names.insert(names.end(),
-               {"sigma_mm", "session_id", "distance_mm", "touch_mm", "anchor_id", "minus_pose_id"});
+  names.insert(names.end(), {"sigma_mm", "session_id", "distance_mm", "touch_mm", "anchor_id",
+                             "minus_pose_id", "from_pose_id"});
   return names;
 }
 

@@ -36,7 +36,7 @@ __all__ = [
 Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[str, float], object]  #: told what is being done and the share done, [0, 1]; may raise to give up
 
-_NAMES = ("pose_id", "tool_id", "payload_id", "session_id", "set", "anchor_id", "minus_pose_id")  #: columns of a batch that hold words
+_NAMES = ("pose_id", "tool_id", "payload_id", "session_id", "set", "anchor_id", "minus_pose_id", "from_pose_id")  #: columns of a batch that hold words
 
 Table = Union[npt.ArrayLike, "pd.DataFrame"]  #: an array, or a pandas frame with the columns of a file
 
