@@ -8,8 +8,8 @@ namespace {
 
 /// The derivative of a number by the place of `anchor`, from its derivative `by_point_W` by the
 /// tool point, which is at `p_W`.
-Eigen::RowVector3d by_place(const PlacedAnchor& anchor, const Eigen::VectorXd& values,
-                            const Vector3& by_point_W, const Vector3& p_W) {
+Eigen::RowVector3d by_anchor_place(const PlacedAnchor& anchor, const Eigen::VectorXd& values,
+                                   const Vector3& by_point_W, const Vector3& p_W) {
   if (!anchor.is_open_plane()) return -by_point_W.transpose();
   const TiltedNormal normal =
       tilted_normal(anchor.said->direction_W, values.segment<2>(anchor.place + 1));
@@ -29,7 +29,7 @@ double told_at(const ToolPoint& point, const PoseContext& context, const Gauge& 
     jacobian->row(0) += sign * (length.by_point_W.transpose() * J);
     if (anchor.place >= 0)
       jacobian->block<1, 3>(0, anchor.place) +=
-          sign * by_place(anchor, values, length.by_point_W, p_W);
+          sign * by_anchor_place(anchor, values, length.by_point_W, p_W);
     if (anchor.zero >= 0) (*jacobian)(0, anchor.zero) += sign;
   }
   return length.value + anchor.zero_at(values);
