@@ -248,6 +248,32 @@ TEST(UrScript, InverseAndSumOfConstantPosesAreFoldedToo) {
   EXPECT_NEAR(at(2)[4], 1.0472, 1e-12);
 }
 
+TEST(UrScript, AShareOfTheWayBetweenConstantPosesIsFolded) {
+  const test::Corrected made = script(
+      "def p():\n" + kTcp +
+      "  from = p[1.8, -0.2, 0.8, 0, 1.0, 0]\n  to = p[1.8, 0.2, 0.9, 0, 1.2, 0]\n"
+      "  quarter = 0.25\n  movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
+      "  movel(interpolate_pose(from, to, quarter))\n"
+      "  movel(interpolate_pose(from, to, sensed()))\n"
+      "  movel(interpolate_pose(p[1.8, 0, 0.8, 0, 0, 0], p[1.8, 0, 0.8, 0, 3.1415926, 0], 0.5))\n"
+      "end\n");
+  // Both turn about the same axis, so that the angles are a quarter of the way apart, too.
+  const ReceiptRow folded = row_of(made.program, "interpolate_pose(from, to, quarter)");
+  ASSERT_TRUE(folded.corrected()) << folded.message;
+  const auto at = folded.before;
+  EXPECT_NEAR(at[0], 1.8, 1e-12);
+  EXPECT_NEAR(at[1], -0.1, 1e-12);
+  EXPECT_NEAR(at[2], 0.825, 1e-12);
+  EXPECT_NEAR(at[4], 1.05, 1e-12);
+  EXPECT_NE(test::why(made, "interpolate_pose(from, to, sensed())").find("not constant"),
+            std::string::npos);
+  EXPECT_NE(test::why(made,
+                      "interpolate_pose(p[1.8, 0, 0.8, 0, 0, 0], p[1.8, 0, 0.8, 0, 3.1415926, 0], "
+                      "0.5)")
+                .find("either way"),
+            std::string::npos);
+}
+
 TEST(UrScript, WhatIsSeenFromAConveyorIsLeft) {
   for (const char* track :
        {"track_conveyor_linear(p[0.1, 0, 0, 0, 0, 0], 500)", "track_conveyor_circular(c, 500)"}) {

@@ -16,7 +16,8 @@ constexpr int kDeepest = 20;
 }  // namespace
 
 bool is_function_of_poses(const std::string& name) {
-  return name == "pose_trans" || name == "pose_inv" || name == "pose_add";
+  return name == "pose_trans" || name == "pose_inv" || name == "pose_add" ||
+         name == "interpolate_pose";
 }
 
 bool defines(const Token& token) {
@@ -128,6 +129,10 @@ Value Values::value_at(std::size_t& at, int depth) const {
     value.name = std::string(tokens_[at++].text);
     if (tokens_[at].is("(")) read_call(++at, value, depth);
   } else {
+    if (tokens_[at].is_number()) {
+      value.kind = Value::Kind::kNumber;
+      value.numbers.push_back(tokens_[at]);
+    }
     ++at;
   }
   value.end = tokens_[at - 1].end;
@@ -198,6 +203,7 @@ Told<Pose> Values::pose_of_value(const Value& value, int depth, bool stored) con
   if (now->kind == Value::Kind::kPose)
     return pose_of(Coordinates::kRotationVector, numbers_in(*now));
   if (now->kind != Value::Kind::kCall) return because("it is not constant");
+  if (now->name == "interpolate_pose") return between(*now, depth, inner);
   const std::size_t due = now->name == "pose_inv" ? 1 : 2;
   if (!is_function_of_poses(now->name) || now->arguments.size() != due || depth > kDeepest)
     return because(fmt::format("the function {} decides it", shown(now->name)));
@@ -208,6 +214,33 @@ Told<Pose> Values::pose_of_value(const Value& value, int depth, bool stored) con
   if (!right) return right;
   if (now->name == "pose_trans") return *left * *right;
   return make_pose(left->linear() * right->linear(), left->translation() + right->translation());
+}
+
+/// `interpolate_pose(p_from, p_to, 0.5)`: a share of the straight way and of the one turn that leads
+/// from the first rotation to the second. Half a turn may go either way, so that it is refused.
+Told<Pose> Values::between(const Value& call, int depth, bool stored) const {
+  constexpr double kLargestTurn = 3.14;  // rad
+  const std::vector<Value>& given = call.arguments;
+  const bool named = std::any_of(given.begin(), given.end(),
+                                 [](const Value& value) { return !value.label.empty(); });
+  if (given.size() != 3 || named || depth > kDeepest)
+    return because(fmt::format("the function {} decides it", shown(call.name)));
+  const Told<Pose> from = pose_of_value(given[0], depth + 1, stored);
+  if (!from) return from;
+  const Told<Pose> to = pose_of_value(given[1], depth + 1, stored);
+  if (!to) return to;
+  const Told<Value> number = resolved(given[2], stored);
+  if (!number) return because(number.error());
+  if (number->kind != Value::Kind::kNumber)
+    return because(fmt::format("the share that {} takes is not constant", shown(call.name)));
+  const double share = value_in(number->numbers[0]);
+  const Eigen::AngleAxisd turn(Matrix3(from->linear().transpose() * to->linear()));
+  if (turn.angle() > kLargestTurn)
+    return because(fmt::format("{} turns by half a turn, which may go either way",
+                               shown(call.name)));
+  const Matrix3 part = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  return make_pose(from->linear() * part, from->translation() +
+                                              share * (to->translation() - from->translation()));
 }
 
 }  // namespace trammel::cam::urscript

@@ -19,9 +19,9 @@ using Told = tl::expected<T, std::string>;
   return tl::make_unexpected(std::move(why));
 }
 
-/// Six numbers in brackets, a name, or a function of such.
+/// Six numbers in brackets, one number, a name, or a function of such.
 struct Value {
-  enum class Kind { kPose, kJoints, kName, kCall, kOther };
+  enum class Kind { kPose, kJoints, kNumber, kName, kCall, kOther };
   Kind kind = Kind::kOther;
   std::size_t begin = 0, end = 0;
   int line = 1;
@@ -52,7 +52,7 @@ struct Assignment {
   std::size_t number = 0;
 };
 
-/// `pose_trans`, `pose_inv`, `pose_add`
+/// `pose_trans`, `pose_inv`, `pose_add`, `interpolate_pose`
 [[nodiscard]] bool is_function_of_poses(const std::string& name);
 /// `def`, `thread`
 [[nodiscard]] bool defines(const Token& token);
@@ -88,6 +88,7 @@ class Values {
   [[nodiscard]] std::size_t function_here() const;
   void read_list(std::size_t& at, Value& value) const;
   void read_call(std::size_t& at, Value& value, int depth) const;
+  [[nodiscard]] Told<Pose> between(const Value& call, int depth, bool stored) const;
   void note_assignment(std::size_t at);
   void note_parameters(std::size_t at);
   static void find_order(Variable& variable);
