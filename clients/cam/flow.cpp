@@ -267,6 +267,21 @@ Flow flow_of(const std::vector<Step>& steps, bool in_any_order) {
   return Order(steps, in_any_order).flow();
 }
 
+std::vector<bool> behind(const Flow& flow, const std::vector<std::size_t>& steps) {
+  std::vector<bool> found(flow.next.size(), false);
+  std::vector<std::size_t> open = steps;
+  while (!open.empty()) {
+    const std::size_t step = open.back();
+    open.pop_back();
+    for (const std::size_t after : flow.next[step]) {
+      if (after >= found.size() || found[after]) continue;
+      found[after] = true;
+      open.push_back(after);
+    }
+  }
+  return found;
+}
+
 std::vector<std::set<std::size_t>> motions_before(
     const Flow& flow, const std::function<std::optional<std::size_t>(std::size_t step)>& moves) {
   using Last = std::set<std::size_t>;

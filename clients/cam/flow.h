@@ -54,6 +54,7 @@ struct Aside {
   std::size_t from = 0, to = 0;  ///< it may be entered before the steps [from, to), which are not
                                  ///< its own
   bool at_failures = false;      ///< true: not before steps that never fail
+  std::vector<bool> begun = {};  ///< of each step: it may have begun there; empty: anywhere
 };
 
 /// The possible paths of a program.
@@ -67,6 +68,9 @@ struct Flow {
 
 /// `in_any_order`: routines that nothing calls are entered again and again, behind one another.
 [[nodiscard]] Flow flow_of(const std::vector<Step>& steps, bool in_any_order = false);
+
+/// The statements that may come behind `steps`, by their number.
+[[nodiscard]] std::vector<bool> behind(const Flow& flow, const std::vector<std::size_t>& steps);
 
 /// The state before each statement; see states_before().
 template <typename State, typename Apply, typename Join>
@@ -129,7 +133,8 @@ class StatesBefore {
         const Aside& aside = flow_.asides[a];
         const bool own = step >= aside.first && step <= aside.end;
         if (own || step < aside.from || step >= aside.to ||
-            (aside.at_failures && flow_.never_fails[step]))
+            (aside.at_failures && flow_.never_fails[step]) ||
+            (!aside.begun.empty() && !aside.begun[step]))
           continue;
         reach(aside.first, state);
         const std::optional<State> back = made_by(a, state);

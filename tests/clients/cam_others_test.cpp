@@ -232,6 +232,25 @@ TEST(UrScript, AThreadMaySetItsToolAtAnyTime) {
   EXPECT_TRUE(harmless.program.rows.at(1).corrected()) << harmless.program.rows[1].message;
 }
 
+TEST(UrScript, AThreadUsesTheToolThatIsSetBeforeItIsStarted) {
+  const auto with = [](const std::string& before, const std::string& behind) {
+    return script("def drill():\n  thread work():\n    movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
+                  "    movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0], a=1.2, v=0.1)\n  end\n" +
+                  before + "  run work()\n" + behind + "  sleep(9)\nend\n");
+  };
+  const std::string hole = "p[1.8, -0.25, 0.8, 0, 1.0472, 0]";
+  const test::Corrected set = with(kTcp, "");
+  EXPECT_TRUE(row_of(set.program, hole).corrected()) << test::why(set, hole);
+  const test::Corrected late = with("", kTcp);
+  EXPECT_FALSE(row_of(late.program, hole).corrected());
+  const test::Corrected again = with(kTcp, "  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n");
+  EXPECT_FALSE(row_of(again.program, hole).corrected());
+  // Another thread starts it, so that it may be under way before the tool is set.
+  const test::Corrected nested =
+      with("  thread other():\n    run work()\n  end\n  run other()\n" + kTcp, "");
+  EXPECT_FALSE(row_of(nested.program, hole).corrected());
+}
+
 TEST(UrScript, InverseAndSumOfConstantPosesAreFoldedToo) {
   const test::Corrected made =
       script("def p():\n" + kTcp +

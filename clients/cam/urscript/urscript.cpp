@@ -81,6 +81,7 @@ class Script {
     for (const Statement& statement : statements_) steps.push_back(statement.step);
     Flow flow = flow_of(steps);
     flow.entries = {0};
+    begin_threads(flow);
     const std::vector<State> states = states_before(
         flow, State{tool, 0, {}, {}}, [&](std::size_t s, State& state) { set(s, state); },
         [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
@@ -111,6 +112,30 @@ class Script {
   }
 
  private:
+  /// A thread comes in behind the `run` that starts it. One that a thread starts, that nothing
+  /// starts, or that is started where the script does not come, may come in anywhere.
+  void begin_threads(Flow& flow) const {
+    const std::vector<bool> script = behind(flow, flow.entries);
+    std::vector<std::size_t> firsts;
+    for (const Aside& aside : flow.asides) firsts.push_back(aside.first);
+    const std::vector<bool> in_threads = behind(flow, firsts);
+    for (Aside& aside : flow.asides) {
+      const std::string_view name = tokens_[statements_[aside.first - 1].at + 1].text;
+      std::vector<std::size_t> runs;
+      bool certain = true;
+      for (std::size_t s = 0; s < statements_.size(); ++s) {
+        const std::size_t at = statements_[s].at;
+        const bool starts = statements_[s].sets == nullptr && at > 0 && tokens_[at].is(name) &&
+                            tokens_[at - 1].is("run");
+        if (!starts) continue;
+        runs.push_back(s);
+        const bool first = std::find(firsts.begin(), firsts.end(), s) != firsts.end();
+        certain = certain && script[s] && !in_threads[s] && !first;
+      }
+      if (certain && !runs.empty()) aside.begun = behind(flow, runs);
+    }
+  }
+
   void reach(std::size_t s, const State& state) {
     const std::size_t at = statements_[s].at;
     const Token word = tokens_[at];
