@@ -216,8 +216,8 @@ Told<Pose> Values::pose_of_value(const Value& value, int depth, bool stored) con
   return make_pose(left->linear() * right->linear(), left->translation() + right->translation());
 }
 
-/// `interpolate_pose(p_from, p_to, 0.5)`: a share of the straight way and of the one turn that leads
-/// from the first rotation to the second. Half a turn may go either way, so that it is refused.
+/// `interpolate_pose(p_from, p_to, 0.5)`: a share of the straight way, and of the one turn that
+/// leads from the first rotation to the second. Half a turn may go either way and is refused.
 Told<Pose> Values::between(const Value& call, int depth, bool stored) const {
   constexpr double kLargestTurn = 3.14;  // rad
   const std::vector<Value>& given = call.arguments;
