@@ -5,6 +5,7 @@
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
 #include "server/robot/cell_values_file.h"
+#include "server/robot/joint_pulses.h"
 #include "server/robot/smallest_step.h"
 
 /// The robot file: joints, links, limits, and which joints follow others.
@@ -51,6 +52,28 @@ ArmSteps read_steps(const YamlMap& robot) {
   return steps;
 }
 
+constexpr double kFewestPulses = 1e-3, kMostPulses = 1e7;  // of a degree
+
+/// Of all joints or of none, since a pulse that is not told leaves the whole target.
+std::vector<double> read_pulses(const YamlMap& robot) {
+  std::vector<double> pulses;
+  const std::vector<YamlMap> joints = robot.maps("joints");
+  for (const YamlMap& joint : joints) {
+    if (!joint.has("pulses_per_deg")) continue;
+    if (joint.text("type", "revolute") != "revolute")
+      joint.refuse("pulses_per_deg", "not of this type of joint");
+    const double number = joint.number("pulses_per_deg");
+    if (!(std::abs(number) >= kFewestPulses && std::abs(number) <= kMostPulses))
+      joint.refuse("pulses_per_deg", refused("{:g}, expected {:g} to {:g}, with its sign", number,
+                                             kFewestPulses, kMostPulses));
+    pulses.push_back(number);
+  }
+  if (!pulses.empty() && pulses.size() != joints.size())
+    robot.refuse("joints", refused("{} of {} joints have pulses_per_deg, expected all or none",
+                                   pulses.size(), joints.size()));
+  return pulses;
+}
+
 /// Reads the limits and the speed of the joint.
 void read_motion(const YamlMap& map, Joint& joint) {
   const bool revolute = joint.type == JointType::kRevolute;
@@ -81,7 +104,7 @@ Joint read_joint(const YamlMap& map) {
   map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg",
             "limits_mm", "sign", "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm",
             "max_speed_deg_s", "max_speed_mm_s", "passive", "encoder_resolution_deg",
-            "encoder_resolution_mm"});
+            "encoder_resolution_mm", "pulses_per_deg"});
   Joint joint;
   map.attempt([&] {
     const std::string type = map.text("type", "revolute");
@@ -159,6 +182,7 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
                  }
                }
                map.attempt([&] { read_steps(map); });
+               map.attempt([&] { read_pulses(map); });
                return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
              })
       .and_then([](Result<Chain> chain) { return chain; })
@@ -173,6 +197,11 @@ Result<Chain> read_robot(const std::string& path) {
 Result<ArmSteps> steps_of(const Cell& cell) {
   if (cell.robot_yaml.empty()) return ArmSteps{};
   return read_yaml(cell.robot_yaml, cell.name, [](const YamlMap& map) { return read_steps(map); });
+}
+
+Result<std::vector<double>> joint_pulses(const Cell& cell) {
+  if (cell.robot_yaml.empty()) return std::vector<double>{};
+  return read_yaml(cell.robot_yaml, cell.name, [](const YamlMap& map) { return read_pulses(map); });
 }
 
 }  // namespace trammel

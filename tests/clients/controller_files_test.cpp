@@ -114,6 +114,32 @@ TEST_F(ControllerFiles, OfAYaskawaParametersAreSaidNotToBeRead) {
   EXPECT_TRUE(has_said("HOME2.DAT: data of the controller")) << said_;
 }
 
+TEST_F(ControllerFiles, AJobInPulsesIsCorrectedWhereTheRobotFileTellsThePulsesOfADegree) {
+  folder_.write("in/TOOL.CND", kTools);
+  folder_.write("in/RC.PRM", "//RC YAS\r\n");
+  folder_.write("in/TRIM.JBI",
+                "/JOB\r\n//NAME TRIM\r\n//POS\r\n///NPOS 1,0,0,0,0,0\r\n///TOOL 1\r\n"
+                "///POSTYPE PULSE\r\n///PULSE\r\nC00000=0,-20000,20000,0,30000,0\r\n//INST\r\n"
+                "///ATTR SC,RW\r\n///GROUP1 RB1\r\nNOP\r\nMOVJ C00000 VJ=20.00\r\nEND\r\n");
+  EXPECT_EQ(correct_folder(), kNotAll);
+  EXPECT_TRUE(has_said("pulses_per_deg of each joint in the robot file")) << said_;
+  const Cell plain = read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml").value();
+  Cell told = plain;
+  const std::string joint = "- {", pulses = "pulses_per_deg: 1000, ";
+  for (std::size_t at = told.robot_yaml.find(joint, told.robot_yaml.find("joints:"));
+       at != std::string::npos; at = told.robot_yaml.find(joint, at + joint.size()))
+    told.robot_yaml.insert(at + joint.size(), pulses);
+  ASSERT_TRUE(parse_robot(told.robot_yaml, "robot").has_value());
+  folder_.write("cell.model",
+                serialize(test::nominal_model(std::make_shared<const Cell>(told), 10)));
+  EXPECT_EQ(correct_folder(), 0) << said_;
+  // One joint alone tells nothing of the others.
+  std::string one = plain.robot_yaml;
+  one.insert(one.find(joint, one.find("joints:")) + joint.size(), pulses);
+  EXPECT_NE(sentence(parse_robot(one, "robot").error()).find("pulses_per_deg"),
+            std::string::npos);
+}
+
 TEST_F(ControllerFiles, AControllersOwnListIsTakenAsFrames) {
   const std::string variables = folder_.write("SYSFRAME.VA", kSystemVariables);
   EXPECT_EQ(correct(kPrograms + "drill.ls", variables), 0) << said_;

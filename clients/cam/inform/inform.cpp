@@ -94,8 +94,8 @@ class Job {
     if (in_pulses && options_.keep_joints) return "joint targets are kept (--keep-joints)";
     if (in_pulses && options_.pulses_per_deg.empty())
       return "it is in pulses, and no file tells how many make a degree: give --pulses-per-deg "
-             "S,L,U,R,B,T (jog each axis, and divide what its pulses change by on the pendant by "
-             "what its angle changes by)";
+             "S,L,U,R,B,T, or pulses_per_deg of each joint in the robot file (jog each axis, and "
+             "divide what its pulses change by on the pendant by what its angle changes by)";
     if (position.numbers.size() < 6)
       return fmt::format("it has {} numbers, 6 are due", position.numbers.size());
     target.coordinates = in_pulses ? Coordinates::kJointPulses : Coordinates::kAnglesXyz;

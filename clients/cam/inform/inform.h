@@ -8,8 +8,8 @@
 namespace trammel::cam {
 
 /// Reads Yaskawa INFORM jobs (.jbi): rectangular positions C00000 and on, with tool, user frame and
-/// RCONF. Pulses need the robot's gear data and are left. The values of TOOL[n] and USER[n] come
-/// from the user; frame BASE or ROBOT is the robot's base.
+/// RCONF, and joints in pulses, if the options tell how many make a degree. The values of TOOL[n]
+/// and USER[n] come from the user; frame BASE or ROBOT is the robot's base.
 [[nodiscard]] Program read_inform(std::vector<SourceFile> files, const ReadOptions& options);
 
 namespace inform {

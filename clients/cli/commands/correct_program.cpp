@@ -206,6 +206,7 @@ Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArgumen
   cam::ReadOptions reading{
       arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes};
   reading.pulses_per_deg = arguments.pulses_per_deg;
+  if (!arguments.service.service) TRY(take_pulses(files, arguments.model, reading));
   return understood_program(files, std::move(reading), arguments.frames);
 }
 

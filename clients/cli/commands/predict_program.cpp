@@ -82,6 +82,7 @@ Result<Extent> predict_program(const PredictProgramArguments& arguments) {
   reading.split = true;  // nothing is written, so a point may be used in several ways
   reading.idle_axes = arguments.idle_axes;
   reading.pulses_per_deg = arguments.pulses_per_deg;
+  if (!arguments.service.service) TRY(take_pulses(files, arguments.model, reading));
   const cam::Program program = TRY(understood_program(files, reading, arguments.frames));
   const cam::PredictedProgram predicted =
       TRY(arguments.service.service ? predict_by_service(program, arguments)

@@ -19,7 +19,9 @@
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/robot/joint_pulses.h"
 
 namespace trammel::cli {
 
@@ -343,6 +345,16 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
       .in(where)
       .next(fmt::format("see that it is the whole program; --format names another kind: {}",
                         cam::dialect_names()));
+}
+
+Status take_pulses(const ProgramFiles& files, const std::string& model, cam::ReadOptions& options) {
+  if (files.dialect != cam::Dialect::kInform || !options.pulses_per_deg.empty()) return {};
+  const CompensatedModel of_robot = TRY(load_model(model));
+  constexpr std::size_t kAxes = 6;
+  std::vector<double> pulses = TRY(joint_pulses(of_robot.cell()));
+  // A rail in the robot file has no place among the six axes of a job.
+  if (pulses.size() == kAxes) options.pulses_per_deg = std::move(pulses);
+  return {};
 }
 
 Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {

@@ -32,6 +32,11 @@ namespace trammel::cli {
                                                       cam::ReadOptions options,
                                                       const std::string& frames);
 
+/// Takes the pulses of a degree from the robot file in the model at `model`, for Yaskawa jobs of
+/// which `options` does not tell them.
+[[nodiscard]] Status take_pulses(const ProgramFiles& files, const std::string& model,
+                                 cam::ReadOptions& options);
+
 /// The originals of a program that is marked as corrected: each file as it was before. Refuses a
 /// file without its original beside it, or with another original than the mark names. `all`: also
 /// if no file is marked, as for a new correction.
