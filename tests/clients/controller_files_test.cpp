@@ -149,6 +149,8 @@ TEST_F(ControllerFiles, AControllersOwnListIsTakenAsFrames) {
   EXPECT_EQ(correct(kPrograms + "drill.jbi", variables), kWrongUsage) << "of another controller";
   EXPECT_EQ(correct(kPrograms + "drill.ls", folder_.write("sysframe.sv", "binary")), kRefusedData);
   EXPECT_TRUE(has_said("SYSFRAME.VA")) << said_;
+  EXPECT_EQ(correct(kPrograms + "drill.ls", folder_.write("framevar.vr", "binary")), kRefusedData);
+  EXPECT_TRUE(has_said("save them as text")) << said_;
   EXPECT_EQ(correct(kPrograms + "drill.ls", folder_.write("numreg.va", "[*NUMREG*]$NUMREG\n")),
             kRefusedData);
   EXPECT_TRUE(has_said("$MNUFRAME")) << said_;

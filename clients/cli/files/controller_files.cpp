@@ -28,8 +28,8 @@ struct NotRead {
   const char* ending;    ///< in lower case
   const char* sentence;  ///< behind the names
 };
-const std::array<NotRead, 5>& not_read() {
-  static const std::array<NotRead, 5> kAll = {
+const std::array<NotRead, 6>& not_read() {
+  static const std::array<NotRead, 6> kAll = {
       {{cam::Dialect::kInform, ".prm",
         "parameters of the controller are not read, since each controller numbers them otherwise; "
         "pulses_per_deg in the robot file or --pulses-per-deg S,L,U,R,B,T tells how many pulses "
@@ -39,6 +39,9 @@ const std::array<NotRead, 5>& not_read() {
        {cam::Dialect::kFanuc, ".sv",
         "binary system variables are not read: save them as text (SYSFRAME.VA) for frames, tools "
         "and loads"},
+       {cam::Dialect::kFanuc, ".vr",
+        "binary variables are not read: save them as text (FRAMEVAR.VA, SYSFRAME.VA) for frames "
+        "and tools"},
        {cam::Dialect::kUrScript, ".urp",
         "PolyScope's own programs are not read and stay as they are: what they hold is run "
         "uncorrected, unless they call the corrected script"},
@@ -123,7 +126,7 @@ Status read_values(const std::string& folder, ProgramFiles& program) {
 
 bool is_listing(const std::string& path) {
   const std::string ending = lower(fs::path(path).extension().string());
-  return ending == ".va" || ending == ".cnd" || ending == ".sv";
+  return ending == ".va" || ending == ".cnd" || ending == ".sv" || ending == ".vr";
 }
 
 Result<cam::SourceFile> read_listing(const std::string& path, cam::Dialect dialect) {
@@ -134,8 +137,8 @@ Result<cam::SourceFile> read_listing(const std::string& path, cam::Dialect diale
                    cam::name_of(own), cam::name_of(dialect))
         .in(path)
         .of("--frames");
-  if (ending == ".sv")
-    return refused("binary system variables")
+  if (ending == ".sv" || ending == ".vr")
+    return refused("binary variables")
         .in(path)
         .of("--frames")
         .next("save them as text: SYSFRAME.VA");
