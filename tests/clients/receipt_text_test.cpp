@@ -38,9 +38,10 @@ TEST(LeftTargets, AFewAreToldOneByOne) {
 TEST(LeftTargets, ManyAreToldByTheirReasonTheOneOfMostMotionsFirst) {
   EXPECT_EQ(left_alone_text(program(20, 30)),
             "50 of 50 targets are left as they were:\n"
-            "  p0 weld.mod line 50 and 19 more: refused: it has no tool\n"
-            "  s0 weld.mod line 10 and 29 more: refused: a sensor ends it\n"
-            "no motion is corrected; the first reason alone leaves 40 of 70 motions\n");
+            "  40 motions, p0 weld.mod line 50 and 19 more: refused: it has no tool\n"
+            "  30 motions, s0 weld.mod line 10 and 29 more: refused: a sensor ends it\n"
+            "no motion is corrected; one reason leaves 40 of 70 motions: "
+            "refused: it has no tool\n");
 }
 
 TEST(LeftTargets, WhereSomethingIsCorrectedNoSingleReasonIsHeldUp) {

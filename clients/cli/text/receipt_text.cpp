@@ -248,14 +248,16 @@ std::string by_reason(const CorrectedProgram& program, std::size_t most_lines) {
     const ReceiptRow& first = *reasons[k].first;
     const std::string more =
         reasons[k].targets > 1 ? fmt::format(" and {} more", reasons[k].targets - 1) : "";
-    text += fmt::format("  {} {} line {}{}: {}\n", first.name.empty() ? first.motion : first.name,
-                        first.file, first.line, more, why_left(first));
+    text += fmt::format("  {} motion{}, {} {} line {}{}: {}\n", reasons[k].motions,
+                        reasons[k].motions == 1 ? "" : "s",
+                        first.name.empty() ? first.motion : first.name, first.file, first.line,
+                        more, why_left(first));
   }
   if (reasons.size() > most_lines)
     text += fmt::format("  and {} more reasons\n", reasons.size() - most_lines);
   if (program.moves_corrected == 0 && reasons.size() > 1 && reasons[0].motions > 1)
-    text += fmt::format("no motion is corrected; the first reason alone leaves {} of {} motions\n",
-                        reasons[0].motions, program.moves);
+    text += fmt::format("no motion is corrected; one reason leaves {} of {} motions: {}\n",
+                        reasons[0].motions, program.moves, why_left(*reasons[0].first));
   return text;
 }
 
