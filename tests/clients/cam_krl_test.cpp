@@ -314,6 +314,19 @@ const std::string kFdat =
     "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] \" \",TQ_STATE FALSE}\n"
     "DECL FDAT FTCP={TOOL_NO 1,BASE_NO 2,IPO_FRAME #TCP,POINT2[] \" \",TQ_STATE FALSE}\nENDDAT\n";
 
+TEST(Krl, ToolAndBaseOfAnFdatStayWhereItsOtherPartsAreSet) {
+  const auto with = [](const std::string& lines) {
+    return krl(program("$BASE=$NULLFRAME\n" + lines + "SPLINE WITH $BASE=SBASE(FP1.BASE_NO)\nSPL " +
+                       kPoint + "\nENDSPLINE\n"),
+               kFdat);
+  };
+  const test::Corrected other = with("FP1.TQ_STATE=TRUE\nFP1.POINT2[]=\"XP1\"\n");
+  ASSERT_EQ(other.refusal, "");
+  EXPECT_NEAR(row_of(other.program, kPoint).p_B.x(), 1.8, 1e-9) << test::why(other, kPoint);
+  EXPECT_TRUE(row_of(other.program, kPoint).corrected());
+  EXPECT_FALSE(row_of(with("FP1.BASE_NO=1\n").program, kPoint).corrected());
+}
+
 TEST(Krl, WhatASplineSetsAtItsHeadHoldsForEachOfItsMotions) {
   const std::string far = "{X 1800,Y 0,Z 1000,A 0,B 60,C 0}";
   for (const char* head :

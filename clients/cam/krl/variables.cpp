@@ -14,6 +14,14 @@ namespace {
 
 constexpr int kDeepest = 20;  // calls within calls, names that stand for names
 
+/// `FP1.TQ_STATE`, `FP1.POINT2[]`: parts of an FDAT that say nothing of tool, base or place.
+bool is_without_place(const std::string& name) {
+  const std::size_t part = name.find('.');
+  if (part == std::string::npos) return false;
+  const std::string what = name.substr(part + 1);
+  return what == "TQ_STATE" || what == "POINT2" || what == "POINT2[]";
+}
+
 bool is_equal(const std::vector<Value>& a, const std::vector<Value>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const Value& one, const Value& other) {
@@ -62,6 +70,7 @@ void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
   if (!tokens[next].is("=")) return;
   std::size_t end = next;
   std::vector<Value> operands = operands_at(tokens, next + 1, &end);
+  if (is_without_place(name[0].name)) return;
   const std::string root = root_of(name[0].name);
   const auto key = std::pair(stem_of(files_[f].name), root);
   Variable& variable = variables_[key];
