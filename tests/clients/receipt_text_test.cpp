@@ -1,8 +1,8 @@
-#include "clients/cli/text/receipt_text.h"
+#include "clients/programs/receipt_text.h"
 
 #include <gtest/gtest.h>
 
-namespace trammel::cli {
+namespace trammel::cam {
 namespace {
 
 cam::ReceiptRow left(const std::string& name, int line, const std::string& why,
@@ -51,4 +51,4 @@ TEST(LeftTargets, WhereSomethingIsCorrectedNoSingleReasonIsHeldUp) {
 }
 
 }  // namespace
-}  // namespace trammel::cli
+}  // namespace trammel::cam

@@ -15,8 +15,8 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/notes_text.h"
 #include "clients/cli/text/receipt_page.h"
-#include "clients/cli/text/receipt_text.h"
 #include "clients/cli/work/in_parallel.h"
+#include "clients/programs/receipt_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -199,7 +199,7 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
   }
   if (!arguments.receipt.empty()) texts.push_back({arguments.receipt, receipt_csv(corrected)});
   if (!arguments.json.empty())
-    texts.push_back({arguments.json, receipt_json(corrected, verdict, done.notes)});
+    texts.push_back({arguments.json, receipt_json(corrected, verdict ? tolerance_json(*verdict) : nullptr, done.notes)});
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {

@@ -15,6 +15,7 @@
 #include "clients/cam/mark.h"
 #include "clients/cam/stated_robot.h"
 #include "clients/cli/files/controller_files.h"
+#include "clients/programs/model_tools.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
@@ -337,14 +338,9 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
     TRY(check_used(rows, frames, program, files.dialect));
     return program;
   }
-  const bool is_empty = std::all_of(files.files.begin(), files.files.end(),
-                                    [](const cam::SourceFile& file) { return file.text.empty(); });
-  const std::string where = files.paths.front() == "-" ? "standard input" : files.paths.front();
-  return refused("{}no motion of a {} program in it, expected {}", is_empty ? "it is empty: " : "",
-                 cam::name_of(files.dialect), cam::motions_of(files.dialect))
-      .in(where)
-      .next(fmt::format("see that it is the whole program; --format names another kind: {}",
-                        cam::dialect_names()));
+  return cam::no_motion_in(
+      files.files, files.dialect,
+      files.paths.front() == "-" ? "standard input" : files.paths.front());
 }
 
 Status take_pulses(const ProgramFiles& files, const std::string& model, cam::ReadOptions& options) {

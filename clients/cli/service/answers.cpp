@@ -1,18 +1,17 @@
 #include "clients/cli/service/answers.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 #include <string_view>
-#include <type_traits>
 
 #include "server/base/letters.h"
+#include "server/exchange/columns.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/pose_columns.h"
+#include "server/report/answer_json.h"
 #include "server/report/note_json.h"
 
 namespace trammel::cli {
@@ -21,41 +20,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
+using exchange::each_column;
+using exchange::each_column_at;
 using exchange::kPoseColumns;
-
-/// The numbers of a figure, in the order of its columns.
-std::array<double, 1> numbers_of(double value) { return {value}; }
-template <std::size_t N>
-const std::array<double, N>& numbers_of(const std::array<double, N>& values) {
-  return values;
-}
-std::array<double, 3> numbers_of(const std::optional<std::array<double, 3>>& values) {
-  constexpr double kNotLearned = std::numeric_limits<double>::quiet_NaN();
-  return values.value_or(std::array{kNotLearned, kNotLearned, kNotLearned});
-}
-std::array<double, 7> numbers_of(const exchange::Pose& pose) {
-  const auto& [p, q] = pose;
-  return {p[0], p[1], p[2], q[0], q[1], q[2], q[3]};
-}
-
-/// Calls `take(name, number)` for each number that has a column.
-template <typename Value, typename Take>
-void each_column(std::string_view names, const Value& value, const Take& take) {
-  for (const double number : numbers_of(value)) {
-    const std::string_view name = names.substr(0, names.find(','));
-    if (!name.empty()) take(std::string(name), number);
-    names.remove_prefix(std::min(name.size() + 1, names.size()));
-  }
-}
-
-/// As above, for the figures of an answer at this place of a table.
-template <typename Figures, typename Answer, typename Take>
-void each_column_at(exchange::Place place, const Figures& figures, const Answer& answer,
-                    const Take& take) {
-  exchange::each_figure(figures, [&](const auto& figure) {
-    if (figure.place == place) each_column(figure.columns, answer.*figure.value, take);
-  });
-}
 
 std::string pose_fields(const exchange::Pose& pose) {
   std::string fields;
@@ -63,42 +30,6 @@ std::string pose_fields(const exchange::Pose& pose) {
     fields += (fields.empty() ? "" : ",") + csv_number(number);
   });
   return fields;
-}
-
-ordered_json json_of(double value) {
-  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
-}
-
-ordered_json pose_json(const exchange::Pose& pose) {
-  ordered_json json;
-  each_column(kPoseColumns, pose,
-              [&](const std::string& name, double number) { json[name] = number; });
-  return json;
-}
-
-/// Adds the figures of an answer at one of these places.
-template <typename Figures, typename Answer>
-void put_figures(const std::set<exchange::Place>& places, const Figures& figures,
-                 const Answer& answer, ordered_json& json) {
-  exchange::each_figure(figures, [&](const auto& figure) {
-    const auto& value = answer.*figure.value;
-    using Value = std::decay_t<decltype(value)>;
-    if (!places.contains(figure.place)) return;
-    if constexpr (std::is_same_v<Value, exchange::Pose>) {
-      json[figure.name] = pose_json(value);
-    } else if constexpr (std::is_integral_v<Value>) {
-      json[figure.columns] = value;
-    } else {
-      each_column(figure.columns, value,
-                  [&](const std::string& name, double number) { json[name] = json_of(number); });
-    }
-  });
-}
-
-/// True if there is a pose to command. Otherwise no numbers are written, since a program could take
-/// them for a command.
-bool has_command(const exchange::CorrectedTarget& target) {
-  return target.status == "ok" || target.status == "out_of_domain" || target.status == "lead_in";
 }
 
 JointType type_of(const std::vector<JointType>& types, std::size_t joint) {
@@ -146,14 +77,10 @@ std::string predictions_csv(const JointList& list, const Predictions& prediction
 }
 
 ordered_json predictions_json(const JointList& list, const Predictions& predictions) {
-  std::set<exchange::Place> told = {exchange::Place::kInFront, exchange::Place::kBehind,
-                                    exchange::Place::kJsonOnly};
-  if (predictions.covariance) told.insert(exchange::Place::kCovariance);
-  if (predictions.orientation) told.insert(exchange::Place::kOrientation);
   ordered_json items = ordered_json::array();
   for (std::size_t i = 0; i < predictions.items.size(); ++i) {
     ordered_json item = {{"pose_id", list.poses[i].pose_id}};
-    put_figures(told, exchange::kPredictionFigures, predictions.items[i], item);
+    put_figures(predictions.items[i], {predictions.covariance, predictions.orientation}, item);
     items.push_back(std::move(item));
   }
   return {{"model", predictions.model_id},
@@ -252,18 +179,6 @@ std::string corrections_csv(const TargetFile& file, const Corrections& correctio
   return text;
 }
 
-namespace {
-
-ordered_json joints_json(const Corrections& corrections, const std::vector<double>& joints_deg) {
-  ordered_json joints = ordered_json::object();
-  for (std::size_t j = 0; j < joints_deg.size(); ++j) {
-    joints[joint_column(static_cast<int>(j), type_of(corrections.joint_types, j))] = joints_deg[j];
-  }
-  return joints;
-}
-
-}  // namespace
-
 ordered_json corrections_json(const TargetFile& file, const Corrections& corrections) {
   ordered_json items = ordered_json::array();
   for (std::size_t i = 0; i < corrections.items.size(); ++i) {
@@ -274,19 +189,15 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
     for (std::size_t k = 0; k < file.rows[i].fields.size(); ++k) {
       json["input"][file.columns[k]] = file.rows[i].fields[k];
     }
-    if (has_command(item)) {
-      json["commanded"] = pose_json(item.commanded);
-      json["joints"] = joints_json(corrections, item.joints_deg);
-    }
+    put_command(item, corrections.joint_types, json);
     if (!corrections.turned_deg.empty()) json["turned_rz_deg"] = corrections.turned_deg[i];
     if (!corrections.lead_ins.empty()) {
       json["lead_in"] = ordered_json::array();
       for (const exchange::CorrectedTarget& point : corrections.lead_ins[i])
-        json["lead_in"].push_back({{"commanded", pose_json(point.commanded)},
-                                   {"joints", joints_json(corrections, point.joints_deg)}});
+        put_command(point, corrections.joint_types,
+                    json["lead_in"].emplace_back(ordered_json::object()));
     }
-    put_figures({exchange::Place::kInFront, exchange::Place::kBehind}, exchange::kCorrectionFigures,
-                item, json);
+    put_figures(item, json);
     items.push_back(json);
   }
   ordered_json all = {{"model", corrections.model_id}};

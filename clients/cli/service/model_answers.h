@@ -3,26 +3,19 @@
 #include <functional>
 #include <string>
 
-#include "clients/cam/cell_tools.h"
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
+#include "clients/programs/model_tools.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/model_file.h"
 
 /// A model's answers for programs, from a file or from a service.
 namespace trammel::cli {
 
-[[nodiscard]] cam::CellTools tools_of(const CompensatedModel& model);
-[[nodiscard]] exchange::ModelInfo info_of(const CompensatedModel& model);
-
-struct ToolAndPayload {
-  std::string tool, payload;
-};
-/// The tool and payload of a program, by the cell's names; empty: its only ones. Refuses those that
-/// the model was not trained with.
-[[nodiscard]] Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model,
-                                                            const std::string& tool,
-                                                            const std::string& payload);
+using cam::info_of;
+using cam::known_tool_and_payload;
+using cam::ToolAndPayload;
+using cam::tools_of;
 
 /// The model of a file. With --service, if no file has that name, it is the service's model: of
 /// `cell@version`, or the model in force of a cell.

@@ -64,23 +64,6 @@ Status write_output(const std::string& path, const std::string& text) {
       .next("see where it goes: the disk may be full, or the reader gone");
 }
 
-nlohmann::ordered_json error_json(const Error& error) {
-  nlohmann::ordered_json json = {{"code", to_text(error.code)}, {"message", error.message}};
-  const auto add = [&](const char* key, const std::string& text) {
-    if (!text.empty()) json[key] = text;
-  };
-  add("file", error.file);
-  if (error.row) json["row"] = *error.row;
-  add("field", error.field);
-  if (error.value) json["value"] = *error.value;
-  if (error.limit) json["limit"] = *error.limit;
-  add("text", error.text);
-  add("next", error.next);
-  for (const Error& other : error.also) json["also"].push_back(error_json(other));
-  json["sentence"] = sentence(error);
-  return json;
-}
-
 void tell_refusal(const Error& error, const std::string& json_path) {
   if (!is_standard_output(json_path) || standard_output_is_taken()) return;
   static_cast<void>(write_json(json_path, {{"error", error_json(error)}}));
@@ -89,12 +72,6 @@ void tell_refusal(const Error& error, const std::string& json_path) {
 Status write_json(const std::string& path, const nlohmann::ordered_json& value) {
   if (path.empty()) return {};
   return write_output(path, json_text(value));
-}
-
-std::string json_text(const nlohmann::ordered_json& value) {
-  // JSON leaves some characters alone that can control a terminal. JSON's own escapes replace them.
-  return shown_lines(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) +
-         "\n";
 }
 
 void tell(const std::string& text, std::initializer_list<std::string> paths) {

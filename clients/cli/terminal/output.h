@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/base/result.h"
+#include "server/report/error_json.h"
 
 namespace trammel::cli {
 
@@ -16,14 +17,9 @@ namespace trammel::cli {
 /// Writes `value` to the path of --json; does nothing for an empty path.
 [[nodiscard]] Status write_json(const std::string& path, const nlohmann::ordered_json& value);
 
-/// The members of an error that are known, and the whole sentence.
-[[nodiscard]] nlohmann::ordered_json error_json(const Error& error);
-
 /// Writes a refusal as `{"error": {...}}` to standard output, if the JSON result would have gone
 /// there and none was written yet. Files stay as they were.
 void tell_refusal(const Error& error, const std::string& json_path);
-
-[[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
 
 /// Text for people on standard output. Control characters of foreign text are spelled out. The text
 /// is painted() if the output is a terminal with colours and NO_COLOR is not set. It is left out

@@ -1,4 +1,4 @@
-#include "clients/cli/text/receipt_text.h"
+#include "clients/programs/receipt_text.h"
 
 #include <algorithm>
 #include <array>
@@ -8,18 +8,16 @@
 #include <map>
 #include <utility>
 
-#include "clients/cli/terminal/output.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/report/error_json.h"
 #include "server/report/note_json.h"
 
-namespace trammel::cli {
+namespace trammel::cam {
 
 namespace {
 
-using cam::CorrectedProgram;
-using cam::ReceiptRow;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kNumbers = 7;  // of the longest kind of target
@@ -49,21 +47,21 @@ void add_numbers(std::string& text, const std::vector<double>& values) {
   }
 }
 
-const char* spelled(cam::Coordinates coordinates) {
+const char* spelled(Coordinates coordinates) {
   switch (coordinates) {
-    case cam::Coordinates::kQuaternion:
+    case Coordinates::kQuaternion:
       return "mm_wxyz";
-    case cam::Coordinates::kAnglesZyx:
+    case Coordinates::kAnglesZyx:
       return "mm_abc_deg";
-    case cam::Coordinates::kAnglesXyz:
+    case Coordinates::kAnglesXyz:
       return "mm_wpr_deg";
-    case cam::Coordinates::kRotationVector:
+    case Coordinates::kRotationVector:
       return "m_rotvec_rad";
-    case cam::Coordinates::kJoints:
+    case Coordinates::kJoints:
       return "joints_deg";
-    case cam::Coordinates::kJointRadians:
+    case Coordinates::kJointRadians:
       return "joints_rad";
-    case cam::Coordinates::kJointPulses:
+    case Coordinates::kJointPulses:
       return "joints_pulses";
   }
   return "";
@@ -150,13 +148,13 @@ std::string receipt_csv(const CorrectedProgram& program) {
 }
 
 std::string receipt_json(const CorrectedProgram& program,
-                         const std::optional<ToleranceVerdict>& verdict,
+                         const ordered_json& tolerance,
                          const std::vector<Note>& of_model) {
   std::vector<Note> notes = of_model;
   for (const std::string& one : program.notes)
     notes.push_back({"program", Note::Severity::kInfo, one});
   ordered_json inserted = ordered_json::array();
-  for (const cam::InsertedLine& line : program.inserted)
+  for (const InsertedLine& line : program.inserted)
     inserted.push_back({{"file", line.file}, {"line", line.line}, {"text", line.text}});
   ordered_json head = {{"model", program.model_id},
                        {"moves", program.moves},
@@ -169,7 +167,7 @@ std::string receipt_json(const CorrectedProgram& program,
                          {"file", program.largest_step_file},
                          {"line", program.largest_step_line}}},
                        {"inserted_lines", inserted}};
-  if (verdict) head["tolerance"] = tolerance_json(*verdict);
+  if (!tolerance.is_null()) head["tolerance"] = tolerance;
   // A line per target: as one JSON value, all of them would take hundreds of megabytes for a long
   // program.
   std::string text = json_text(head);
@@ -278,4 +276,4 @@ std::string left_alone_text(const CorrectedProgram& program) {
   return text;
 }
 
-}  // namespace trammel::cli
+}  // namespace trammel::cam
