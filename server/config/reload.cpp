@@ -67,6 +67,9 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   leave("dds: port", present.dds.port, file.dds.port, &plan.later);
   leave("dds: domain", present.dds.domain, file.dds.domain, &plan.later);
   leave("http: port", present.http.port, file.http.port, &plan.later);
+  leave("http: api", present.http.api, file.http.api, &plan.later);
+  leave("http: tokens", present.http.tokens, file.http.tokens, &plan.later);
+  leave("http: certificate", present.http.certificate, file.http.certificate, &plan.later);
   leave("record", present.dds.record, file.dds.record, &plan.later);
   leave("models_in_memory_mb", present.models_in_memory, file.models_in_memory, &plan.later);
   leave("dds: discovery_servers", present.dds.discovery_servers, file.dds.discovery_servers,

@@ -204,15 +204,32 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
       [&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
 }
 
-/// Reads the address of pages and metrics, which must be on this host. Readers elsewhere go through
-/// a server that authenticates them.
-void read_http(const YamlMap& map, HttpOptions& http) {
-  map.only({"address", "port"});
+/// Reads the address of pages, metrics and requests, and what guards them. An address that leaves
+/// this host needs all of it.
+void read_http(const YamlMap& map, HttpOptions& http, const std::filesystem::path& folder) {
+  map.only({"address", "port", "api", "allow_network", "tokens", "certificate", "key"});
+  map.attempt([&] { http.api = map.boolean("api", http.api); });
+  map.attempt([&] { http.allow_network = map.boolean("allow_network", http.allow_network); });
+  const auto file_of = [&](const char* key, std::string& path) {
+    map.attempt([&] {
+      if (map.has(key) && !map.is_null(key)) path = (folder / map.text(key)).string();
+    });
+  };
+  file_of("tokens", http.tokens);
+  file_of("certificate", http.certificate);
+  file_of("key", http.key);
   map.attempt([&] {
     http.address = map.text("address", http.address);
     in_addr parsed{};
     const bool is_address = ::inet_pton(AF_INET, http.address.c_str(), &parsed) == 1;
-    if (!is_address || ntohl(parsed.s_addr) >> 24 != 127)
+    const bool stays = is_address && ntohl(parsed.s_addr) >> 24 == 127;
+    if (is_address && !stays && http.allow_network &&
+        (http.tokens.empty() || !http.has_tls() || http.key.empty()))
+      map.refuse("address", refused("'{}' leaves this host: it needs `tokens`, `certificate` and "
+                                    "`key`",
+                                    http.address)
+                                .with_text(http.address));
+    if (!is_address || (!stays && !http.allow_network))
       map.refuse("address", refused("'{}', expected 127.x.x.x: pages and metrics stay on this host",
                                     http.address)
                                 .with_text(http.address));
@@ -297,7 +314,7 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
     if (map.has("log")) read_log(map.map("log"), config.log, folder);
   });
   map.attempt([&] {
-    if (map.has("http")) read_http(map.map("http"), config.http);
+    if (map.has("http")) read_http(map.map("http"), config.http, folder);
   });
 }
 

@@ -47,6 +47,11 @@ std::string ClientNames::refused(const std::string& participant) {
   return found->second.claim.empty() ? "says nothing of itself" : found->second.claim;
 }
 
+void ClientNames::called(const std::string& participant, const std::string& name) {
+  const MutexLock lock(mutex_);
+  known_[participant] = {name, {}, true, {}};
+}
+
 void ClientNames::left(const std::string& participant, Time now) {
   const MutexLock lock(mutex_);
   std::erase_if(known_,

@@ -28,6 +28,8 @@ class ClientNames {
   /// What the participant claims to be, which nobody could confirm: `says it is CN=anna,O=Works, at
   /// 10.1.0.7`.
   std::string refused(const std::string& participant);
+  /// A client of a gateway in this process, which has found out its name.
+  void called(const std::string& participant, const std::string& name);
   void left(const std::string& participant, Time now = std::chrono::steady_clock::now());
 
   /// Empty: it was not admitted, or its name does not match.

@@ -19,6 +19,7 @@
 #include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
+#include "server/dds/gateway/local_calls.h"
 #include "server/dds/handlers.h"
 #include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
@@ -163,6 +164,11 @@ class DdsService::Running {
     running->core_.recorder = running->recorder_.get();
     running->handlers_.set_names(&running->events_->names());
     TRY(running->open_endpoints());
+    if (options.local_calls)
+      running->local_calls_ = std::make_unique<LocalCalls>(
+          running->core_, running->events_->names(),
+          AllLanes{running->predictions_, running->corrections_, running->reads_,
+                   running->changes_});
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ = std::jthread(
         [r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
@@ -220,6 +226,10 @@ class DdsService::Running {
   [[nodiscard]] ServiceFigures figures() const {
     ServiceFigures now;
     for (const auto& endpoint : endpoints_) now.operations.push_back(endpoint->figures());
+    if (local_calls_) {
+      for (const RequestEndpointBase* endpoint : local_calls_->endpoints())
+        now.operations.push_back(endpoint->figures());
+    }
     now.queues = {{"predictions", predictions_.requests()},
                   {"corrections", corrections_.requests()},
                   {"reads", reads_.requests()},
@@ -238,6 +248,11 @@ class DdsService::Running {
       now.dropped_packets[wire::name_of(reason)] = dropped_->of(reason);
     }
     return now;
+  }
+
+  [[nodiscard]] ServiceCalls* local_calls() { return local_calls_.get(); }
+  void end_local_calls() {
+    if (local_calls_) local_calls_->close();
   }
 
   [[nodiscard]] Movement movement() const { return {true, watchdog_->still()}; }
@@ -414,6 +429,7 @@ class DdsService::Running {
   // By cell; nothing leaves it. A cell publishes one model at a time.
   std::map<std::string, Mutex> publishing_ TRAMMEL_GUARDED_BY(publishing_mutex_);
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::unique_ptr<LocalCalls> local_calls_;  // null: no gateway asks
   std::atomic<std::uint64_t> status_steps_{0};
   std::shared_ptr<const wire::DropCounts> dropped_;
   std::optional<PacketReport> packets_;  // of the status thread
@@ -462,6 +478,7 @@ void DdsService::stop() {
   std::unique_ptr<Running> last;  // destroyed without the lock: its workers may publish
   MutexLock lock(mutex_);
   last.swap(running_);
+  if (last) last->end_local_calls();
   published_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return publishing_ == 0; });
 }
 
@@ -475,6 +492,16 @@ void DdsService::publish_model(const std::string& cell) {
 
 void DdsService::set_limits(const DdsOptions& options) {
   while_running([&](Running& running) { running.set_limits(options); });
+}
+
+bool DdsService::with_calls(const std::function<void(ServiceCalls&)>& work) {
+  bool runs = false;
+  while_running([&](Running& running) {
+    ServiceCalls* calls = running.local_calls();
+    runs = calls != nullptr;
+    if (runs) work(*calls);
+  });
+  return runs;
 }
 
 void DdsService::cells_added() {

@@ -8,6 +8,7 @@
 #include "server/base/result.h"
 #include "server/dds/call_report.h"
 #include "server/dds/dds_options.h"
+#include "server/dds/gateway/service_calls.h"
 #include "server/metrics/service_figures.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
@@ -59,6 +60,9 @@ class DdsService {
   void set_limits(const DdsOptions& options);
   /// Tells clients that the trainer serves more cells.
   void cells_added();
+  /// Calls `work` with the calls of this process if the service runs and DdsOptions::local_calls is
+  /// set; false: it does not. stop() ends the calls under way, and waits for `work`.
+  [[nodiscard]] bool with_calls(const std::function<void(ServiceCalls&)>& work);
   /// The work done since start(); empty if the service does not run.
   [[nodiscard]] ServiceFigures figures();
   /// Reports whether its threads do their work. Waits for none of them.

@@ -46,6 +46,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   /// The sentences of StrangerReport that are due by then.
   [[nodiscard]] std::vector<std::string> strangers_due(PacketReport::Time now);
   [[nodiscard]] const ClientNames& names() const { return names_; }
+  [[nodiscard]] ClientNames& names() { return names_; }
 
  private:
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,

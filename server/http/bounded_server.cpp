@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/letters.h"
 #include "server/base/mutex.h"
 #include "server/http/deadline_stream.h"
 #include "server/http/incoming.h"
@@ -24,6 +25,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kLongestUri = 2048;  // bytes
+constexpr std::size_t kLongestPostPath = 512;  // bytes; the library matches it letter by letter
 constexpr int kBacklog = 1024;             // connections that wait to be accepted
 
 constexpr const char* kTooMany =
@@ -124,23 +126,57 @@ std::vector<std::string> words_of(const std::string& path) {
   return words;
 }
 
-HttpReply reply_to(const httplib::Request& request, const HttpHandler& handler) {
-  if (request.method != "GET" && request.method != "HEAD")
-    return {405,
-            "text/plain; charset=utf-8",
-            "nothing can be changed here\n",
-            {{"Allow", "GET, HEAD"}}};
-  if (request.target.size() > kLongestUri)
-    return {414, "text/plain; charset=utf-8", "the address is too long\n"};
-  if (!is_of_this_host(request.get_header_value("Host")))
-    return {421, "text/plain; charset=utf-8", "ask for 127.0.0.1 or localhost\n"};
-  HttpAsk ask{words_of(request.path), {}};
+constexpr const char* kPlain = "text/plain; charset=utf-8";
+
+HttpAsk ask_in(const httplib::Request& request) {
+  HttpAsk ask{words_of(request.path), {}, request.method == "POST" ? "POST" : "GET", {}, {}};
   for (const auto& [name, value] : request.params) ask.options[name] = value;
+  for (const auto& [name, value] : request.headers) ask.headers[lower(name)] = value;
+  return ask;
+}
+
+HttpReply guarded_reply(const HttpHandler& handler, const HttpAsk& ask) {
   try {
     return handler(ask);
   } catch (const std::exception& failed) {
-    return {500, "text/plain; charset=utf-8", std::string(failed.what()) + "\n"};
+    return {500, kPlain, std::string(failed.what()) + "\n"};
   }
+}
+
+bool is_post_below(const std::optional<HttpPosts>& posts, const httplib::Request& request) {
+  return posts && request.method == "POST" && first_word(request.target) == posts->word;
+}
+
+/// Why a request is not even looked at. A body must say how long it is and come as it is: the
+/// library does not limit one in pieces or one that grows when it is unpacked.
+std::optional<HttpReply> refused_request(const httplib::Request& request, const HttpLimits& limits) {
+  const bool posts = is_post_below(limits.posts, request);
+  if (request.method != "GET" && request.method != "HEAD" && !posts)
+    return HttpReply{
+        405, kPlain, "nothing can be changed here\n", {{"Allow", "GET, HEAD"}}};
+  if (request.target.size() > kLongestUri || (posts && request.path.size() > kLongestPostPath))
+    return HttpReply{414, kPlain, "the address is too long\n"};
+  if (limits.stays_here && !is_of_this_host(request.get_header_value("Host")))
+    return HttpReply{421, kPlain, "ask for 127.0.0.1 or localhost\n"};
+  if (!posts) return std::nullopt;
+  if (request.has_header("Transfer-Encoding") || !request.has_header("Content-Length"))
+    return HttpReply{411, kPlain, "say Content-Length, and send no pieces\n"};
+  const std::string type = request.get_header_value("Content-Type");
+  const std::string kind = type.substr(0, type.find(';'));
+  if (request.has_header("Content-Encoding") ||
+      (kind != "application/json" && kind != "application/octet-stream" && kind != "text/csv"))
+    return HttpReply{415, kPlain,
+                     "send application/json, text/csv or application/octet-stream, not packed\n"};
+  return limits.posts->admission ? limits.posts->admission(ask_in(request)) : std::nullopt;
+}
+
+void put_reply(HttpReply reply, httplib::Response& response) {
+  response.status = reply.code;
+  for (const auto& [name, value] : reply.headers) response.set_header(name, value);
+  response.set_header("X-Content-Type-Options", "nosniff");
+  response.set_header("Referrer-Policy", "no-referrer");
+  response.set_header("Cache-Control", "no-store");
+  response.set_content(std::move(reply.body), reply.type);
 }
 
 sockaddr_in socket_address(const std::string& address, std::uint16_t port) {
@@ -159,7 +195,12 @@ class BoundedServer::Running final : public httplib::Server {
       : limits_(limits), handler_(std::move(handler)) {
     for (const std::string& word : limits_.apart)
       apart_[word] =
-          std::make_unique<Workers>(1, limits_.waiting, [this](int socket) { serve(socket); });
+          std::make_unique<Workers>(1, limits_.waiting,
+                                    [this](int socket) { serve(socket, limits_.reading); });
+    if (limits_.posts)
+      apart_[limits_.posts->word] = std::make_unique<Workers>(
+          limits_.posts->workers, limits_.waiting,
+          [this](int socket) { serve(socket, limits_.posts->reading); });
     new_task_queue = [] { return new AtOnce; };
     // By default it would share the port with another listener.
     set_socket_options([](int socket) {
@@ -169,15 +210,13 @@ class BoundedServer::Running final : public httplib::Server {
     // Runs before the search for a route, whose regular expressions recurse too deep for a long
     // path.
     set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
-      HttpReply reply = reply_to(request, handler_);
-      response.status = reply.code;
-      for (const auto& [name, value] : reply.headers) response.set_header(name, value);
-      response.set_header("X-Content-Type-Options", "nosniff");
-      response.set_header("Referrer-Policy", "no-referrer");
-      response.set_header("Cache-Control", "no-store");
-      response.set_content(std::move(reply.body), reply.type);
+      auto refused = refused_request(request, limits_);
+      if (!refused && request.method == "POST")
+        return HandlerResponse::Unhandled;  // the library reads its body, and calls post()
+      put_reply(refused ? std::move(*refused) : guarded_reply(handler_, ask_in(request)), response);
       return HandlerResponse::Handled;
     });
+    if (limits_.posts) take_posts();
   }
   ~Running() override {
     stop();
@@ -198,12 +237,27 @@ class BoundedServer::Running final : public httplib::Server {
   [[nodiscard]] std::uint64_t shed() const { return shed_; }
 
  private:
+  void take_posts() {
+    set_payload_max_length(limits_.posts->body);
+    Post(".*", [this](const httplib::Request& request, httplib::Response& response) {
+      HttpAsk ask = ask_in(request);
+      ask.body = request.body;
+      put_reply(guarded_reply(handler_, ask), response);
+    });
+    set_error_handler([this](const httplib::Request&, httplib::Response& response) {
+      if (!response.body.empty() || response.status != 413) return;
+      put_reply({413, kPlain,
+                 "more than " + std::to_string(limits_.posts->body) + " bytes in one request\n"},
+                response);
+    });
+  }
+
   bool process_and_close_socket(socket_t socket) override {
     incoming_.add(socket);
     return true;
   }
-  void serve(int socket) {
-    DeadlineStream stream(socket, limits_.reading, limits_.writing);
+  void serve(int socket, std::chrono::milliseconds reading) {
+    DeadlineStream stream(socket, reading, limits_.writing, limits_.tls);
     bool closed = false;
     // One request per connection, neither compressed nor in pieces. Both would cost work, and all
     // clients are on this host.
@@ -213,7 +267,8 @@ class BoundedServer::Running final : public httplib::Server {
     });
   }
   void give(int socket, const std::string& head) {
-    const auto own = apart_.find(first_word(head));
+    const auto own = apart_.find(limits_.tls && limits_.posts ? limits_.posts->word
+                                                              : first_word(head));
     Workers& workers = own == apart_.end() ? workers_ : *own->second;
     if (!workers.take(socket)) shed(socket);
   }
@@ -225,11 +280,12 @@ class BoundedServer::Running final : public httplib::Server {
   const HttpLimits limits_;
   const HttpHandler handler_;
   std::atomic<std::uint64_t> shed_{0};
-  Workers workers_{limits_.workers, limits_.waiting, [this](int socket) { serve(socket); }};
+  Workers workers_{limits_.workers, limits_.waiting,
+                   [this](int socket) { serve(socket, limits_.reading); }};
   std::map<std::string, std::unique_ptr<Workers>> apart_;  // by the first word of the path
   Incoming incoming_{limits_.waiting, limits_.reading,
                      [this](int socket, const std::string& head) { give(socket, head); },
-                     [this](int socket) { shed(socket); }};
+                     [this](int socket) { shed(socket); }, limits_.tls != nullptr};
   std::jthread thread_;
 };
 
@@ -243,7 +299,7 @@ Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& a
                                                             std::uint16_t port,
                                                             const HttpLimits& limits,
                                                             HttpHandler handler) {
-  TRY(check_http_address(address, port));
+  TRY(check_http_address(address, port, limits.stays_here));
   auto running = std::make_unique<Running>(limits, std::move(handler));
   if (!running->bind_to_port(address, port))
     return failure(ErrorCode::kConflict, "{}:{} cannot be listened on", address, port)
@@ -255,8 +311,8 @@ Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& a
   return std::unique_ptr<BoundedServer>(new BoundedServer(std::move(running)));
 }
 
-Status check_http_address(const std::string& address, std::uint16_t port) {
-  if (!is_of_this_host(address) || address == "localhost")
+Status check_http_address(const std::string& address, std::uint16_t port, bool stays_here) {
+  if (stays_here && (!is_of_this_host(address) || address == "localhost"))
     return failure(ErrorCode::kUsage, "'{}' is not 127.x.x.x: pages and metrics stay on this host",
                    address)
         .of("address")

@@ -23,12 +23,21 @@ void read_what_is_left(int socket) {
 }  // namespace
 
 DeadlineStream::DeadlineStream(int socket, std::chrono::milliseconds reading,
-                               std::chrono::milliseconds writing)
-    : socket_(socket), read_until_(Clock::now() + reading), writing_(writing) {
+                               std::chrono::milliseconds writing, const TlsContext& tls)
+    : socket_(socket),
+      tls_(tls ? ::SSL_new(tls.get()) : nullptr, ::SSL_free),
+      read_until_(Clock::now() + reading),
+      writing_(writing) {
   ::fcntl(socket_, F_SETFL, ::fcntl(socket_, F_GETFL) | O_NONBLOCK);
+  if (!tls_) return;
+  ::SSL_set_fd(tls_.get(), socket_);
+  ::SSL_set_accept_state(tls_.get());
 }
 
-DeadlineStream::~DeadlineStream() { close_with_words(socket_); }
+DeadlineStream::~DeadlineStream() {
+  if (tls_) ::SSL_shutdown(tls_.get());
+  close_with_words(socket_);
+}
 
 bool DeadlineStream::wait(short events, Clock::time_point until) const {
   for (;;) {
@@ -47,10 +56,9 @@ bool DeadlineStream::is_writable() const { return wait(POLLOUT, Clock::now() + w
 
 ssize_t DeadlineStream::read(char* bytes, std::size_t size) {
   while (from_ == to_) {
-    if (!wait(POLLIN, read_until_)) return -1;
-    const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), 0);
+    const ssize_t got = get(buffer_.data(), buffer_.size());
     if (got == 0) return 0;
-    if (got < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+    if (got == kWaits && wait(wanted_, read_until_)) continue;
     if (got < 0) return -1;
     from_ = 0;
     to_ = static_cast<std::size_t>(got);
@@ -64,10 +72,43 @@ ssize_t DeadlineStream::read(char* bytes, std::size_t size) {
 ssize_t DeadlineStream::write(const char* bytes, std::size_t size) {
   if (write_until_ == Clock::time_point{}) write_until_ = Clock::now() + writing_;
   for (;;) {
-    if (!wait(POLLOUT, write_until_)) return -1;
-    const ssize_t put = ::send(socket_, bytes, size, MSG_NOSIGNAL);
-    if (put >= 0) return put;
-    if (errno != EAGAIN && errno != EINTR) return -1;
+    const ssize_t gone = put(bytes, size);
+    if (gone >= 0) return gone;
+    if (gone != kWaits || !wait(wanted_, write_until_)) return -1;
+  }
+}
+
+ssize_t DeadlineStream::get(char* bytes, std::size_t size) {
+  if (tls_) return outcome_of_tls(::SSL_read(tls_.get(), bytes, static_cast<int>(size)));
+  const ssize_t got = ::recv(socket_, bytes, size, 0);
+  wanted_ = POLLIN;
+  return got < 0 && (errno == EAGAIN || errno == EINTR) ? kWaits : got;
+}
+
+ssize_t DeadlineStream::put(const char* bytes, std::size_t size) {
+  if (tls_) {
+    constexpr std::size_t kAtOnce = 16384;  // bytes, a record
+    return outcome_of_tls(
+        ::SSL_write(tls_.get(), bytes, static_cast<int>(std::min(size, kAtOnce))));
+  }
+  const ssize_t gone = ::send(socket_, bytes, size, MSG_NOSIGNAL);
+  wanted_ = POLLOUT;
+  return gone < 0 && (errno == EAGAIN || errno == EINTR) ? kWaits : gone;
+}
+
+ssize_t DeadlineStream::outcome_of_tls(int done) {
+  if (done > 0) return done;
+  switch (::SSL_get_error(tls_.get(), done)) {
+    case SSL_ERROR_WANT_READ:
+      wanted_ = POLLIN;
+      return kWaits;
+    case SSL_ERROR_WANT_WRITE:
+      wanted_ = POLLOUT;
+      return kWaits;
+    case SSL_ERROR_ZERO_RETURN:
+      return 0;
+    default:
+      return -1;
   }
 }
 

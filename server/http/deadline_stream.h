@@ -5,17 +5,22 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <memory>
 #include <string>
+
+#include "server/http/tls.h"
 
 namespace trammel {
 
 /// A connection that ends when its time is over, however slowly the other side sends or reads.
-/// Closes it at the end.
+/// Closes it at the end. With TLS the handshake is part of the first read.
 class DeadlineStream final : public httplib::Stream {
  public:
   using Clock = std::chrono::steady_clock;
 
-  DeadlineStream(int socket, std::chrono::milliseconds reading, std::chrono::milliseconds writing);
+  /// `tls` null: without TLS.
+  DeadlineStream(int socket, std::chrono::milliseconds reading, std::chrono::milliseconds writing,
+                 const TlsContext& tls = nullptr);
   ~DeadlineStream() override;
   DeadlineStream(const DeadlineStream&) = delete;
   DeadlineStream& operator=(const DeadlineStream&) = delete;
@@ -33,7 +38,16 @@ class DeadlineStream final : public httplib::Stream {
   /// Until the socket is ready for `events`; false once `until` is over.
   [[nodiscard]] bool wait(short events, Clock::time_point until) const;
 
+  /// The bytes taken or given; 0: the other side has ended; kWaits: once the socket is ready for
+  /// `wanted_`; else an error.
+  [[nodiscard]] ssize_t get(char* bytes, std::size_t size);
+  [[nodiscard]] ssize_t put(const char* bytes, std::size_t size);
+  [[nodiscard]] ssize_t outcome_of_tls(int done);
+  static constexpr ssize_t kWaits = -2;
+
   const int socket_;
+  const std::unique_ptr<SSL, void (*)(SSL*)> tls_;  // null: without
+  short wanted_ = 0;                                // of poll()
   const Clock::time_point read_until_;
   const std::chrono::milliseconds writing_;
   Clock::time_point write_until_{};  // set by the first byte written

@@ -33,11 +33,25 @@ struct Incoming::Head {
 };
 
 // A connection that has ended sends nothing more.
-Incoming::Head Incoming::head_of(int socket) {
+// A record has its kind, its version and its length before it. What begins otherwise is for the
+// handshake to refuse.
+Incoming::Head Incoming::first_record(const std::string& bytes) {
+  constexpr std::size_t kBefore = 5;
+  constexpr char kHandshake = 0x16;
+  if (bytes.empty() || bytes[0] != kHandshake) return {Head::kThere, {}};
+  if (bytes.size() < kBefore) return {};
+  const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(bytes[at]); };
+  const std::size_t whole = kBefore + (std::size_t{byte(3)} << 8 | byte(4));
+  if (whole > kLongestHead) return {Head::kTooLong, {}};
+  return {bytes.size() < whole ? Head::kNotYet : Head::kThere, {}};
+}
+
+Incoming::Head Incoming::head_of(int socket) const {
   std::string bytes(kLongestHead, '\0');
   const ssize_t size = ::recv(socket, bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT);
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return {};
   bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+  if (tls_) return first_record(bytes);
   if (size <= 0 || bytes.find("\r\n\r\n") != std::string::npos)
     return {Head::kThere, std::move(bytes)};
   return {bytes.size() == kLongestHead ? Head::kTooLong : Head::kNotYet, {}};
@@ -48,11 +62,12 @@ void Incoming::take(int socket, const Head& head) const {
 }
 
 Incoming::Incoming(std::size_t most, std::chrono::milliseconds patience, Come come,
-                   PushedOut pushed_out)
+                   PushedOut pushed_out, bool tls)
     : most_(most),
       patience_(patience),
       come_(std::move(come)),
       pushed_out_(std::move(pushed_out)),
+      tls_(tls),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
       wakes_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   epoll_event event{EPOLLIN, {.fd = wakes_}};

@@ -23,7 +23,9 @@ class Incoming {
 
   /// `come`: takes a connection that can be read at once. `pushed_out`: takes connections that made
   /// room, and those that still wait at the end.
-  Incoming(std::size_t most, std::chrono::milliseconds patience, Come come, PushedOut pushed_out);
+  /// With `tls` a connection is handed on once its first record is complete, with an empty head.
+  Incoming(std::size_t most, std::chrono::milliseconds patience, Come come, PushedOut pushed_out,
+           bool tls = false);
   ~Incoming();
   Incoming(const Incoming&) = delete;
   Incoming& operator=(const Incoming&) = delete;
@@ -38,7 +40,8 @@ class Incoming {
   };
 
   struct Head;
-  [[nodiscard]] static Head head_of(int socket);
+  [[nodiscard]] static Head first_record(const std::string& bytes);
+  [[nodiscard]] Head head_of(int socket) const;
   /// Hands on a connection with a complete head, and closes one whose head is too long.
   void take(int socket, const Head& head) const;
   void watch(const std::stop_token& stop);
@@ -52,6 +55,7 @@ class Incoming {
   const std::chrono::milliseconds patience_;
   const Come come_;
   const PushedOut pushed_out_;
+  const bool tls_;
   const int epoll_, wakes_;
   Mutex mutex_;
   std::vector<Slow> slow_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first

@@ -7,7 +7,6 @@
 
 #include "clients/cli/text/notes_text.h"
 #include "server/error_sources/cause_words.h"
-#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -23,30 +22,6 @@ std::string date_text(std::int64_t unix_s) {
   if (::gmtime_r(&time, &parts) == nullptr) return "-";
   return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
                      parts.tm_mday, parts.tm_hour, parts.tm_min);
-}
-
-template <typename Number>
-ordered_json if_known(const std::optional<Number>& number) {
-  return number ? ordered_json(*number) : ordered_json(nullptr);
-}
-
-ordered_json model_json(const exchange::ModelInfo& model) {
-  return {{"cell", model.cell},
-          {"version", model.version},
-          {"in_force", model.in_force},
-          {"id", model.id},
-          {"hash", model.hash},
-          {"level", model.level},
-          {"batch", model.batch_id},
-          {"batch_hash", model.batch_hash},
-          {"trained_at_unix_s", model.trained_at_unix_s},
-          {"training_age_s", model.training_age_s},
-          {"measured_at_unix_s", if_known(model.measured_at_unix_s)},
-          {"data_age_s", if_known(model.data_age_s)},
-          {"training_poses", model.training_poses},
-          {"validation_rms_mm", if_known(model.validation_rms_mm)},
-          {"notes", notes_json(model.notes)},
-          {"budget", {{"sentences", model.budget}}}};
 }
 
 std::string kind_in_words(const std::string& kind) {
@@ -68,39 +43,6 @@ std::string job_line(const client::DatedJob& job) {
 }
 
 }  // namespace
-
-ordered_json job_json(const client::JobStatus& job) {
-  return {{"job", job.job},
-          {"cell", job.cell},
-          {"stage", job.stage},
-          {"what", job.what},
-          {"share", job.share},
-          {"model_version", job.model_version},
-          {"in_force", job.in_force},
-          {"verdict", job.verdict},
-          {"held_back", job.held_back},
-          {"before_mm", if_known(job.before_mm)},
-          {"after_mm", if_known(job.after_mm)},
-          {"limit_mm", if_known(job.limit_mm)},
-          {"u95_mm", if_known(job.u95_mm)},
-          {"why", job.why},
-          {"next", job.next}};
-}
-
-ordered_json jobs_json(const std::vector<client::DatedJob>& jobs) {
-  ordered_json list = ordered_json::array();
-  for (const client::DatedJob& job : jobs) {
-    ordered_json one = job_json(job.status);
-    one.update({{"server", job.worker.empty() ? job.server : job.worker},
-                {"kind", job.kind},
-                {"batches", job.batches},
-                {"created_unix_s", job.created_unix_s},
-                {"started_unix_s", if_known(job.started_unix_s)},
-                {"finished_unix_s", if_known(job.finished_unix_s)}});
-    list.push_back(std::move(one));
-  }
-  return list;
-}
 
 std::string jobs_text(const std::vector<client::DatedJob>& jobs) {
   std::map<std::string, std::string> done;
@@ -150,12 +92,6 @@ std::string started_text(const std::string& cell, std::int64_t job) {
       "A model of cell {1} is trained now, and put in force if it is better on poses held out.\n"
       "trammel watch {0} follows it; trammel models {1} lists what came of it.\n",
       job, cell);
-}
-
-ordered_json models_json(const std::vector<exchange::ModelInfo>& models) {
-  ordered_json json = ordered_json::array();
-  for (const exchange::ModelInfo& model : models) json.push_back(model_json(model));
-  return json;
 }
 
 std::string models_text(const std::vector<exchange::ModelInfo>& models, TableForm form) {

@@ -6,13 +6,12 @@
 
 #include "clients/cli/terminal/table.h"
 #include "clients/session/session.h"
+#include "server/report/history_json.h"
 
 /// Texts of a service on its servers, models, jobs and batches, for people (dates in UTC) and for
 /// programs.
 namespace trammel::cli {
 
-[[nodiscard]] nlohmann::ordered_json job_json(const client::JobStatus& job);
-[[nodiscard]] nlohmann::ordered_json jobs_json(const std::vector<client::DatedJob>& jobs);
 /// A line per job: those that run and wait, the last done one of each cell, and those that failed.
 [[nodiscard]] std::string jobs_text(const std::vector<client::DatedJob>& jobs);
 /// One row per job, with the outcome of those that have ended.
@@ -21,7 +20,6 @@ namespace trammel::cli {
 /// A job that has begun, and the commands that show its progress.
 [[nodiscard]] std::string started_text(const std::string& cell, std::int64_t job);
 
-[[nodiscard]] nlohmann::ordered_json models_json(const std::vector<exchange::ModelInfo>& models);
 [[nodiscard]] std::string models_text(const std::vector<exchange::ModelInfo>& models,
                                       TableForm form = TableForm::kTable);
 

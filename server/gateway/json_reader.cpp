@@ -1,0 +1,124 @@
+#include "server/gateway/json_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "server/base/json_guard.h"
+
+namespace trammel {
+namespace {
+
+bool is_integer(const nlohmann::json& value) {
+  if (!value.is_number_integer()) return false;
+  const double number = value.get<double>();
+  return std::abs(number) <= std::numeric_limits<int>::max();
+}
+
+}  // namespace
+
+Result<nlohmann::json> read_json_object(const std::string& body) {
+  JsonLimits limits;
+  limits.text_bytes = body.size() + 1;  // a program may be one text
+  TRY(check_json_limits(body, "the body", limits));
+  auto json = nlohmann::json::parse(body, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::kUsage, "the body is no JSON object");
+  return json;
+}
+
+JsonReader::JsonReader(const nlohmann::json& object, std::string where)
+    : object_(object), where_(std::move(where)) {}
+
+const nlohmann::json* JsonReader::find(const char* name) const {
+  if (!object_.is_object()) return nullptr;
+  const auto found = object_.find(name);
+  return found == object_.end() || found->is_null() ? nullptr : &*found;
+}
+
+void JsonReader::refuse(const char* name, const std::string& expected) {
+  if (!status_) return;
+  Error wrong = failure(ErrorCode::kUsage, "'{}': expected {}", name, expected).of(name).value();
+  wrong.file = where_;
+  status_ = tl::make_unexpected(std::move(wrong));
+}
+
+void JsonReader::only(std::initializer_list<const char*> names) {
+  if (!object_.is_object()) return refuse("", "an object");
+  for (const auto& [name, value] : object_.items()) {
+    const bool known = std::any_of(names.begin(), names.end(),
+                                   [&](const char* one) { return std::string_view(one) == name; });
+    if (!known) refuse(name.c_str(), "no member of this name");
+  }
+}
+
+bool JsonReader::has(const char* name) const { return find(name) != nullptr; }
+
+std::string JsonReader::text(const char* name) {
+  const nlohmann::json* value = find(name);
+  if (value == nullptr) return {};
+  if (value->is_string()) return value->get<std::string>();
+  refuse(name, "a text");
+  return {};
+}
+
+bool JsonReader::flag(const char* name) {
+  const nlohmann::json* value = find(name);
+  if (value == nullptr) return false;
+  if (value->is_boolean()) return value->get<bool>();
+  refuse(name, "true or false");
+  return false;
+}
+
+std::optional<double> JsonReader::number(const char* name) {
+  const nlohmann::json* value = find(name);
+  if (value == nullptr) return std::nullopt;
+  if (value->is_number()) return value->get<double>();
+  refuse(name, "a number");
+  return std::nullopt;
+}
+
+std::optional<int> JsonReader::integer(const char* name) {
+  const nlohmann::json* value = find(name);
+  if (value == nullptr) return std::nullopt;
+  if (is_integer(*value)) return value->get<int>();
+  refuse(name, "a whole number");
+  return std::nullopt;
+}
+
+std::vector<double> JsonReader::numbers(const char* name) {
+  const nlohmann::json* value = find(name);
+  if (value == nullptr) return {};
+  std::vector<double> numbers;
+  bool good = value->is_array();
+  for (const nlohmann::json& one : *value) {
+    good = good && one.is_number();
+    if (good) numbers.push_back(one.get<double>());
+  }
+  if (!good) refuse(name, "a list of numbers");
+  return numbers;
+}
+
+std::vector<int> JsonReader::integers(const char* name) {
+  const nlohmann::json* value = find(name);
+  if (value == nullptr) return {};
+  std::vector<int> numbers;
+  bool good = value->is_array();
+  for (const nlohmann::json& one : *value) {
+    good = good && is_integer(one);
+    if (good) numbers.push_back(one.get<int>());
+  }
+  if (!good) refuse(name, "a list of whole numbers");
+  return numbers;
+}
+
+const nlohmann::json& JsonReader::list(const char* name) {
+  static const nlohmann::json kNone = nlohmann::json::array();
+  const nlohmann::json* value = find(name);
+  if (value != nullptr && value->is_array()) return *value;
+  refuse(name, "a list");
+  return kNone;
+}
+
+}  // namespace trammel
