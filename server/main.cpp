@@ -24,6 +24,7 @@
 #include "server/dds/dds_service.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/watchdog.h"
+#include "server/gateway/gateway.h"
 #include "server/host/caught_signals.h"
 #include "server/host/log.h"
 #include "server/host/service_manager.h"
@@ -275,11 +276,16 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   tell_record(**store);
   ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
+  config.dds.local_calls = config.http.api && config.http.port != 0;
   DdsService service(config.dds, trainer, **store, registry);
+  Gateway gateway(
+      registry, [&service](const auto& work) { return service.with_calls(work); },
+      config.dds.program_version);
   HttpServer http(config.http,
                   {config.dds.server_id, config.dds.program_version, spoken_place(config.store),
                    trainer, **store, registry, [&service] { return service.figures(); },
-                   [&service] { return service.movement(); }});
+                   [&service] { return service.movement(); }},
+                  gateway.api());
   TRY(http.start());
   service.set_call_listener(log_call);
   service.set_packet_listener(

@@ -212,6 +212,9 @@ std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder
   const std::string target = room_of(folder_of(header)), room = room_of(folder);
   if (target == room) return std::nullopt;
   if (room == "server/config" && header.ends_with("_options.h")) return std::nullopt;
+  // Whole programs are corrected there, too; both see lower floors alone.
+  if (room == "server/gateway" && (target == "clients/cam" || target == "clients/programs"))
+    return std::nullopt;
   const auto target_floor = floor_of(rooms, target);
   if (const auto outsider = kOutsiders.find(room); outsider != kOutsiders.end()) {
     if (outsider->second.folders.contains(target)) return std::nullopt;

@@ -39,8 +39,7 @@ exchange::AskedTarget target_in(JsonReader& item, const exchange::Rails& rails) 
   target.joint_target = !item.has("x_mm") && !target.seed_rad.empty();
   if (!target.joint_target) target.pose = pose_in(item);
   target.approach = approach_in(item);
-  if (target.conf && !target.seed_rad.empty())
-    item.refuse("conf", "either a branch or joints");
+  if (target.conf && !target.seed_rad.empty()) item.refuse("conf", "either a branch or joints");
   if (!target.conf && target.seed_rad.empty())
     item.refuse("conf", "a branch, or `joints_deg` near the target");
   return target;

@@ -14,8 +14,8 @@ namespace trammel {
 /// `{"poses": [{"joints_deg": [...], "directions", "temperature_c", "time_s"}]}`
 [[nodiscard]] Result<std::vector<exchange::AskedJoints>> poses_in(JsonReader& body,
                                                                   const exchange::Rails& rails);
-/// `{"targets": [{"x_mm" ... "qz", "conf" or "joints_deg", ...}]}`; a target with joints and without
-/// a pose is a joint target.
+/// `{"targets": [{"x_mm" ... "qz", "conf" or "joints_deg", ...}]}`; a target with joints and
+/// without a pose is a joint target.
 [[nodiscard]] Result<std::vector<exchange::AskedTarget>> targets_in(JsonReader& body,
                                                                     const exchange::Rails& rails);
 

@@ -25,8 +25,8 @@ std::string date_of_today() {
 
 Result<cam::Dialect> dialect_of_sent(const SentProgram& program) {
   const std::string& name = program.files.front().name;
-  const auto dialect = program.format.empty() ? cam::dialect_of_file(name)
-                                              : cam::dialect_called(program.format);
+  const auto dialect =
+      program.format.empty() ? cam::dialect_of_file(name) : cam::dialect_called(program.format);
   if (dialect) return *dialect;
   return failure(ErrorCode::kUsage, "{} says nothing of the kind of program",
                  program.format.empty() ? "the ending of " + name : "'" + program.format + "'")

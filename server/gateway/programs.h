@@ -25,11 +25,8 @@ struct ReturnedProgram {
 
 /// Corrects a program by the model `served`: the service answers for its targets, and refuses once
 /// another model is in force. Refuses the same as `trammel correct`. `version`: of this software.
-[[nodiscard]] Result<ReturnedProgram> correct_sent_program(ServiceCalls& calls,
-                                                           const CallFrom& from,
-                                                           const ServedModel& served,
-                                                           SentProgram program,
-                                                           const std::string& version,
-                                                           CallOutcome& outcome);
+[[nodiscard]] Result<ReturnedProgram> correct_sent_program(
+    ServiceCalls& calls, const CallFrom& from, const ServedModel& served, SentProgram program,
+    const std::string& version, CallOutcome& outcome);
 
 }  // namespace trammel

@@ -40,9 +40,9 @@ struct RouteOption {
 struct Route {
   Endpoint endpoint;
   const char* method;
-  const char* path;  ///< `/cells/{cell}/predict`
-  Role role;         ///< the least that may ask
-  const char* what;  ///< for people
+  const char* path;   ///< `/cells/{cell}/predict`
+  Role role;          ///< the least that may ask
+  const char* what;   ///< for people
   const char* takes;  ///< type of the body, and the schema's name behind a blank; empty: no body
   const char* gives;  ///< likewise of the answer
   std::vector<RouteOption> options;
