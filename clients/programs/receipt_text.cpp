@@ -147,8 +147,7 @@ std::string receipt_csv(const CorrectedProgram& program) {
   return text;
 }
 
-std::string receipt_json(const CorrectedProgram& program,
-                         const ordered_json& tolerance,
+std::string receipt_json(const CorrectedProgram& program, const ordered_json& tolerance,
                          const std::vector<Note>& of_model) {
   std::vector<Note> notes = of_model;
   for (const std::string& one : program.notes)

@@ -144,7 +144,7 @@ exchange::ModelInfo from_wire(const ModelInfo& info) {
 
 exchange::JobStatus status_of(const Job& job) {
   exchange::JobStatus status{job.number(), job.cell(),          text(job.stage()), job.what(),
-                   job.share(),  job.model_version(), job.in_force()};
+                             job.share(),  job.model_version(), job.in_force()};
   const JobOutcome& outcome = job.outcome();
   status.verdict = text(outcome.verdict());
   status.held_back = text(outcome.held_back());

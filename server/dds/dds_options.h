@@ -29,7 +29,8 @@ struct DdsOptions {
   int queued_mb = 256;         ///< memory of all of them together
   RecordOptions record = {};   ///< of predictions and corrections
   double cell_share = 0.5;     ///< of these two limits, for the requests of one cell
-  bool local_calls = false;  ///< true: a gateway in this process asks, too (gateway/service_calls.h)
+  bool local_calls =
+      false;          ///< true: a gateway in this process asks, too (gateway/service_calls.h)
   bool ros2 = false;  ///< true: ROS 2 nodes are answered, too (idl/transport/ros2.h); not together
                       ///< with `security`
 };

@@ -165,10 +165,10 @@ class DdsService::Running {
     running->handlers_.set_names(&running->events_->names());
     TRY(running->open_endpoints());
     if (options.local_calls)
-      running->local_calls_ = std::make_unique<LocalCalls>(
-          running->core_, running->events_->names(),
-          AllLanes{running->predictions_, running->corrections_, running->reads_,
-                   running->changes_});
+      running->local_calls_ =
+          std::make_unique<LocalCalls>(running->core_, running->events_->names(),
+                                       AllLanes{running->predictions_, running->corrections_,
+                                                running->reads_, running->changes_});
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ = std::jthread(
         [r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });

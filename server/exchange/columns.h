@@ -41,8 +41,7 @@ void each_column(std::string_view names, const Value& value, const Take& take) {
 
 /// As above, for the figures of an answer at this place of a table.
 template <typename Figures, typename Answer, typename Take>
-void each_column_at(Place place, const Figures& figures, const Answer& answer,
-                    const Take& take) {
+void each_column_at(Place place, const Figures& figures, const Answer& answer, const Take& take) {
   each_figure(figures, [&](const auto& figure) {
     if (figure.place == place) each_column(figure.columns, answer.*figure.value, take);
   });

@@ -24,9 +24,9 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kLongestUri = 2048;  // bytes
+constexpr std::size_t kLongestUri = 2048;      // bytes
 constexpr std::size_t kLongestPostPath = 512;  // bytes; the library matches it letter by letter
-constexpr int kBacklog = 1024;             // connections that wait to be accepted
+constexpr int kBacklog = 1024;                 // connections that wait to be accepted
 
 constexpr const char* kTooMany =
     "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 9\r\nContent-Type: "
@@ -149,11 +149,11 @@ bool is_post_below(const std::optional<HttpPosts>& posts, const httplib::Request
 
 /// Why a request is not even looked at. A body must say how long it is and come as it is: the
 /// library does not limit one in pieces or one that grows when it is unpacked.
-std::optional<HttpReply> refused_request(const httplib::Request& request, const HttpLimits& limits) {
+std::optional<HttpReply> refused_request(const httplib::Request& request,
+                                         const HttpLimits& limits) {
   const bool posts = is_post_below(limits.posts, request);
   if (request.method != "GET" && request.method != "HEAD" && !posts)
-    return HttpReply{
-        405, kPlain, "nothing can be changed here\n", {{"Allow", "GET, HEAD"}}};
+    return HttpReply{405, kPlain, "nothing can be changed here\n", {{"Allow", "GET, HEAD"}}};
   if (request.target.size() > kLongestUri || (posts && request.path.size() > kLongestPostPath))
     return HttpReply{414, kPlain, "the address is too long\n"};
   if (limits.stays_here && !is_of_this_host(request.get_header_value("Host")))
@@ -194,13 +194,12 @@ class BoundedServer::Running final : public httplib::Server {
   Running(const HttpLimits& limits, HttpHandler handler)
       : limits_(limits), handler_(std::move(handler)) {
     for (const std::string& word : limits_.apart)
-      apart_[word] =
-          std::make_unique<Workers>(1, limits_.waiting,
-                                    [this](int socket) { serve(socket, limits_.reading); });
+      apart_[word] = std::make_unique<Workers>(
+          1, limits_.waiting, [this](int socket) { serve(socket, limits_.reading); });
     if (limits_.posts)
-      apart_[limits_.posts->word] = std::make_unique<Workers>(
-          limits_.posts->workers, limits_.waiting,
-          [this](int socket) { serve(socket, limits_.posts->reading); });
+      apart_[limits_.posts->word] =
+          std::make_unique<Workers>(limits_.posts->workers, limits_.waiting,
+                                    [this](int socket) { serve(socket, limits_.posts->reading); });
     new_task_queue = [] { return new AtOnce; };
     // By default it would share the port with another listener.
     set_socket_options([](int socket) {
@@ -267,8 +266,8 @@ class BoundedServer::Running final : public httplib::Server {
     });
   }
   void give(int socket, const std::string& head) {
-    const auto own = apart_.find(limits_.tls && limits_.posts ? limits_.posts->word
-                                                              : first_word(head));
+    const auto own =
+        apart_.find(limits_.tls && limits_.posts ? limits_.posts->word : first_word(head));
     Workers& workers = own == apart_.end() ? workers_ : *own->second;
     if (!workers.take(socket)) shed(socket);
   }

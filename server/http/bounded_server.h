@@ -17,11 +17,11 @@ namespace trammel {
 
 /// Requests that send something: below one first word, by workers of their own.
 struct HttpPosts {
-  std::string word;                         ///< of their paths: `api`
-  std::size_t workers = 16;                 ///< they wait for the service, which computes
-  std::size_t body = std::size_t{1} << 20;  ///< bytes that one may send
+  std::string word;                           ///< of their paths: `api`
+  std::size_t workers = 16;                   ///< they wait for the service, which computes
+  std::size_t body = std::size_t{1} << 20;    ///< bytes that one may send
   std::chrono::milliseconds reading{30'000};  ///< for a request from its first byte to its last
-  HttpAdmission admission;                  ///< is asked before a body is read
+  HttpAdmission admission;                    ///< is asked before a body is read
 };
 
 struct HttpLimits {
@@ -36,17 +36,18 @@ struct HttpLimits {
   bool stays_here = true;               ///< false: other hosts may ask
 };
 
-/// A server of HTTP/1.1 for GET and HEAD, and for POST below one word, one request per connection. It has a fixed number of
-/// threads of low priority, bounded queues, and a time limit for each request. A client that sends
-/// slowly holds up nobody. A client that reads slowly holds up only other readers that share its
-/// workers. Neither affects the rest of the process. Where only this host may ask, it answers to
-/// names of this host only, so that no foreign page can send requests through a browser (DNS
-/// rebinding). With TLS all requests share the workers of HttpPosts: what one asks for is known
-/// only after the handshake.
+/// A server of HTTP/1.1 for GET and HEAD, and for POST below one word, one request per connection.
+/// It has a fixed number of threads of low priority, bounded queues, and a time limit for each
+/// request. A client that sends slowly holds up nobody. A client that reads slowly holds up only
+/// other readers that share its workers. Neither affects the rest of the process. Where only this
+/// host may ask, it answers to names of this host only, so that no foreign page can send requests
+/// through a browser (DNS rebinding). With TLS all requests share the workers of HttpPosts: what
+/// one asks for is known only after the handshake.
 class BoundedServer {
  public:
   /// Listens until it is destroyed. `handler` is called in its threads. Refuses (kUsage) an address
-  /// that leaves this host, though `stays_here`, or that this host does not have, and (kConflict) an occupied port.
+  /// that leaves this host, though `stays_here`, or that this host does not have, and (kConflict)
+  /// an occupied port.
   [[nodiscard]] static Result<std::unique_ptr<BoundedServer>> start(const std::string& address,
                                                                     std::uint16_t port,
                                                                     const HttpLimits& limits,

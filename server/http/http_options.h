@@ -11,7 +11,7 @@ struct HttpOptions {
   std::uint16_t port = 0;             ///< TCP; 0: nothing is served
   bool api = false;                   ///< true: requests are answered, too (server/gateway)
   bool allow_network = false;         ///< true: `address` may be one that other hosts reach
-  std::string tokens = {};            ///< file of tokens.h; empty: everybody on this host is believed
+  std::string tokens = {};  ///< file of tokens.h; empty: everybody on this host is believed
   std::string certificate = {}, key = {};  ///< PEM files for TLS; empty: none
 
   [[nodiscard]] bool has_tls() const { return !certificate.empty(); }

@@ -17,8 +17,8 @@ struct HttpApi {
 };
 
 /// Shows the state of a server over HTTP: metrics for Prometheus, health and readiness, and pages
-/// for people; and hands requests to an HttpApi. Changes nothing itself, and works in threads of its own, of low
-/// priority and of a fixed number. README.md has the addresses. Thread-safe.
+/// for people; and hands requests to an HttpApi. Changes nothing itself, and works in threads of
+/// its own, of low priority and of a fixed number. README.md has the addresses. Thread-safe.
 class HttpServer {
  public:
   /// The parts that `server` refers to outlive it.

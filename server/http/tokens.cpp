@@ -34,7 +34,8 @@ bool is_hash(const std::string& word) {
 
 bool is_plain_name(const std::string& name) {
   return name.size() <= kLongestName &&
-         name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") ==
+         name.find_first_not_of(
+             "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") ==
              std::string::npos;
 }
 
@@ -57,16 +58,15 @@ Result<TokenLine> token_line(const std::string& line) {
         .of("role")
         .with_text(role);
   if (!is_hash(hash) || !more.empty())
-    return refused("expected NAME ROLE SHA-256, the hash in 64 small hexadecimal digits").of("hash");
+    return refused("expected NAME ROLE SHA-256, the hash in 64 small hexadecimal digits")
+        .of("hash");
   return TokenLine{hash, {name, *known}};
 }
 
 Status check_private(const std::string& path) {
   struct stat file {};
   if (::stat(path.c_str(), &file) != 0 || (file.st_mode & S_IRWXO) == 0) return {};
-  return refused("others than its owner and group may read it")
-      .in(path)
-      .next("chmod o= " + path);
+  return refused("others than its owner and group may read it").in(path).next("chmod o= " + path);
 }
 
 }  // namespace

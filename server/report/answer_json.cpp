@@ -29,8 +29,9 @@ void put_figures_at(const std::set<exchange::Place>& places, const Figures& figu
     } else if constexpr (std::is_integral_v<Value>) {
       json[figure.columns] = value;
     } else {
-      exchange::each_column(figure.columns, value,
-                  [&](const std::string& name, double number) { json[name] = number_json(number); });
+      exchange::each_column(figure.columns, value, [&](const std::string& name, double number) {
+        json[name] = number_json(number);
+      });
     }
   });
 }
@@ -40,7 +41,7 @@ void put_figures_at(const std::set<exchange::Place>& places, const Figures& figu
 nlohmann::ordered_json pose_json(const exchange::Pose& pose) {
   ordered_json json;
   exchange::each_column(exchange::kPoseColumns, pose,
-              [&](const std::string& name, double number) { json[name] = number; });
+                        [&](const std::string& name, double number) { json[name] = number; });
   return json;
 }
 

@@ -199,7 +199,9 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
   }
   if (!arguments.receipt.empty()) texts.push_back({arguments.receipt, receipt_csv(corrected)});
   if (!arguments.json.empty())
-    texts.push_back({arguments.json, receipt_json(corrected, verdict ? tolerance_json(*verdict) : nullptr, done.notes)});
+    texts.push_back(
+        {arguments.json,
+         receipt_json(corrected, verdict ? tolerance_json(*verdict) : nullptr, done.notes)});
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {

@@ -338,9 +338,8 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
     TRY(check_used(rows, frames, program, files.dialect));
     return program;
   }
-  return cam::no_motion_in(
-      files.files, files.dialect,
-      files.paths.front() == "-" ? "standard input" : files.paths.front());
+  return cam::no_motion_in(files.files, files.dialect,
+                           files.paths.front() == "-" ? "standard input" : files.paths.front());
 }
 
 Status take_pulses(const ProgramFiles& files, const std::string& model, cam::ReadOptions& options) {

@@ -57,10 +57,11 @@ exchange::Rails rails_of_cell(const Trainer& trainer, const std::string& cell) {
 
 }  // namespace
 
-LocalClients::LocalClients(ClientNames& names) : names_(names), secret_([] {
-  std::random_device random;
-  return std::uint64_t{random()} << 32 | random();
-}()) {}
+LocalClients::LocalClients(ClientNames& names)
+    : names_(names), secret_([] {
+        std::random_device random;
+        return std::uint64_t{random()} << 32 | random();
+      }()) {}
 
 std::string LocalClients::participant_of(const std::string& client) {
   std::string participant = kBeginning;
@@ -115,8 +116,8 @@ LocalCalls::Answers<exchange::CorrectedTarget> LocalCalls::correct(
 
 Result<std::int64_t> LocalCalls::submit(const CallFrom& from, const CallAbout& about,
                                         const SentBatch& batch, CallOutcome& outcome) {
-  const auto reply = TRY(submit_.ask(request_with<wire::SubmitMeasurementsRequest>(about, batch),
-                                     from, outcome));
+  const auto reply =
+      TRY(submit_.ask(request_with<wire::SubmitMeasurementsRequest>(about, batch), from, outcome));
   return reply.job();
 }
 
