@@ -74,6 +74,8 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->log.format, minimal.log.format);
   EXPECT_EQ(shipped->http.address, minimal.http.address);
   EXPECT_EQ(shipped->http.port, minimal.http.port);
+  EXPECT_FALSE(shipped->http.api);
+  EXPECT_EQ(shipped->http.tokens, minimal.http.tokens);
 }
 
 TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
@@ -93,6 +95,21 @@ TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
           << key;
     }
   }
+}
+
+TEST_F(ServerConfigTest, OtherHostsAskOverHttpOnlyWithTokensAndTls) {
+  const std::string open = "address: 192.168.1.4, allow_network: true, api: true";
+  const std::string tls = ", certificate: c.pem, key: k.pem";
+  for (const std::string& guards : {std::string(), std::string(", tokens: tokens"), tls,
+                                    std::string(", tokens: tokens, certificate: c.pem")})
+    EXPECT_FALSE(read_server_config(
+        folder_.write("server.yaml", kMinimal + "http: {" + open + guards + "}\n")))
+        << guards;
+  const auto config = read_server_config(
+      folder_.write("server.yaml", kMinimal + "http: {" + open + ", tokens: tokens" + tls + "}\n"));
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_TRUE(config->http.api);
+  EXPECT_TRUE(config->http.tokens.ends_with("/tokens")) << "relative to the server file";
 }
 
 TEST_F(ServerConfigTest, PagesStayOnThisHostWhateverTheFileSays) {

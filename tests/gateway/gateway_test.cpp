@@ -19,6 +19,7 @@
 #include "tests/dds/backend.h"
 #include "tests/support/http_client.h"
 #include "tests/support/own_ports.h"
+#include "tests/support/web_browser.h"
 
 namespace trammel {
 namespace {
@@ -54,7 +55,7 @@ class GatewayTest : public testing::Test {
         backend_.registry, [this](const auto& work) { return service_->with_calls(work); },
         "0.1.0");
     HttpOptions http;
-    http.port = static_cast<std::uint16_t>(test::own_ports() + 9);
+    http.port = test::own_ports();
     http.api = true;
     http.tokens = tokens;
     port_ = http.port;
@@ -330,6 +331,40 @@ TEST_F(GatewayTest, TheExamplesOfCurlAndPythonCorrectAProgram) {
   EXPECT_NE(text_of(by_curl), "");
   EXPECT_EQ(text_of(by_curl), text_of(by_python + "/weld.mod"));
   EXPECT_NE(text_of(by_python + "/receipt.csv").find("weld.mod"), std::string::npos);
+}
+
+// A person drops a file on the page, and gets it back with its receipt; the page's own policy lets
+// it.
+TEST_F(GatewayTest, APersonDropsAProgramAndGetsItBackWithItsReceipt) {
+  if (!test::WebBrowser::is_there()) GTEST_SKIP() << "no browser";
+  start();
+  test::WebBrowser browser;
+  browser.open("http://127.0.0.1:" + std::to_string(port_) + "/api/v1/?cell=cell-7");
+  std::string plain = kProgram;
+  plain[plain.find('\xe4')] = 'a';
+  const json said = browser.run("const text = " + json(plain).dump() + R"(;
+    window.kept = [];
+    const make = URL.createObjectURL.bind(URL);
+    URL.createObjectURL = blob => { window.kept.push(blob); return make(blob); };
+    const dropped = new DataTransfer();
+    dropped.items.add(new File([text], 'weld.mod'));
+    document.getElementById('drop').dispatchEvent(new DragEvent('drop', {dataTransfer: dropped}));
+    const state = document.getElementById('state');
+    return new Promise(done => {
+      const look = () => state.className || /Model/.test(state.textContent)
+        ? done(state.textContent) : setTimeout(look, 20);
+      look();
+    });)");
+  EXPECT_NE(said.dump().find("1 targets"), std::string::npos) << said;
+  const json files = browser.run(
+      "return [...document.querySelectorAll('#result a')].map(link => link.textContent);");
+  EXPECT_EQ(files, json({"weld.mod", "receipt.csv", "receipt.json"}));
+  const json returned = browser.run("return window.kept[0].text();");
+  const HttpAnswer direct = send({.path = "/api/v1/cells/cell-7/program?name=weld.mod",
+                                  .body = plain,
+                                  .type = "application/octet-stream"});
+  EXPECT_EQ(returned, json(direct.body)) << "as curl gets it";
+  EXPECT_EQ(browser.complaints(), std::vector<std::string>());
 }
 
 }  // namespace

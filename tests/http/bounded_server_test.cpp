@@ -57,6 +57,30 @@ TEST_F(BoundedServerTest, TakesNothingButReading) {
   EXPECT_EQ(head.body, "");
 }
 
+// The library bounds neither a body in pieces nor one that grows when it is unpacked.
+TEST_F(BoundedServerTest, ABodyIsTakenOnlyBelowItsWordAndOnlyWhole) {
+  HttpLimits limits;
+  limits.posts = HttpPosts();
+  limits.posts->word = "api";
+  limits.posts->body = 8;
+  start(limits, [](const HttpAsk& ask) -> HttpReply { return {200, "text/plain", ask.body}; });
+  const auto post = [](const std::string& path, const std::string& headers,
+                       const std::string& body) {
+    return parse_http(http_exchange(
+        kPort, "POST " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n" + body));
+  };
+  const std::string json = "Content-Type: application/json\r\n";
+  EXPECT_EQ(post("/api/a", json + "Content-Length: 3\r\n", "abc").body, "abc");
+  EXPECT_EQ(post("/jobs", json + "Content-Length: 3\r\n", "abc").code, 405);
+  EXPECT_EQ(post("/api/a", json + "Content-Length: 9\r\n", "abcabcabc").code, 413);
+  EXPECT_EQ(post("/api/a", json + "Transfer-Encoding: chunked\r\n", "3\r\nabc\r\n0\r\n\r\n").code,
+            411);
+  EXPECT_EQ(post("/api/a", json + "Content-Encoding: gzip\r\nContent-Length: 3\r\n", "abc").code,
+            415);
+  EXPECT_EQ(post("/api/a", "Content-Type: text/plain\r\nContent-Length: 3\r\n", "abc").code, 415)
+      << "any page could send that";
+}
+
 TEST_F(BoundedServerTest, AnswersToNamesOfThisHostOnly) {
   start();
   for (const char* host : {"127.0.0.1", "127.0.0.1:9464", "localhost", "localhost:80", "127.1.2.3"})

@@ -75,10 +75,12 @@ class LocalEndpoint final : public RequestEndpointBase {
     const auto reply = std::static_pointer_cast<Reply>(
         core_.replies.wait(partition, WaitingReplies::Clock::now() + patience(from)));
     if (!reply)
-      return refused(failure(ErrorCode::kBusy, "no answer within {} ms", patience(from).count())
-                         .next("ask for the state of what was asked before asking again")
-                         .value(),
-                     "deadline_missed", outcome);
+      return refused(
+          failure(ErrorCode::kBusy, "no answer within {} ms, or the service has been asked to stop",
+                  patience(from).count())
+              .next("ask for the state of what was asked before asking again")
+              .value(),
+          "deadline_missed", outcome);
     outcome.result = result_word(reply->header().result());
     outcome.retry_after = std::chrono::milliseconds(reply->header().retry_after_ms());
     if (reply->header().result() == wire::RESULT_OK) return std::move(*reply);
