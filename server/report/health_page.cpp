@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kShownSizes = 8;  // the sizes that are hardest to see
+constexpr std::size_t kSizesOnPage = 8;  // the sizes that are hardest to see
 
 std::string text_in(const json& object, const char* key) {
   return object.is_object() && object.contains(key) && object[key].is_string()
@@ -93,7 +93,7 @@ std::string changes(const json& found) {
 std::string hardest_to_see(const json& found) {
   std::vector<HtmlRow> rows;
   for (const json& one : list_in(found, "smallest_seen")) {
-    if (rows.size() == kShownSizes) break;
+    if (rows.size() == kSizesOnPage) break;
     const std::string size = mm_in(one, "effect_rms_mm");
     rows.push_back({{html_text(cause_of(one)), size == "–" ? "never" : size}});
   }
