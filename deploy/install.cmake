@@ -25,7 +25,8 @@ install(FILES ${PROJECT_BINARY_DIR}/shell/_trammel DESTINATION ${CMAKE_INSTALL_D
 install(FILES ${PROJECT_BINARY_DIR}/shell/trammel.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT trammel)
 install(PROGRAMS deploy/supervise DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel COMPONENT trammeld)
 install(PROGRAMS deploy/security/keys DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel COMPONENT trammeld)
-install(PROGRAMS deploy/http/token deploy/http/correct.sh deploy/http/correct.py DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel/http COMPONENT trammeld)
+install(PROGRAMS deploy/http/token DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel/http COMPONENT trammeld)
+install(PROGRAMS deploy/http/correct.sh deploy/http/correct.py DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/trammeld/examples/http COMPONENT trammeld)
 install(FILES deploy/security/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/trammeld RENAME security.md COMPONENT trammeld)
 install(FILES deploy/watching/alerts.yml deploy/watching/dashboard.json deploy/watching/prometheus.yml deploy/watching/README.md
   DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel/watching COMPONENT trammeld)
