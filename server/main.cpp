@@ -267,6 +267,13 @@ void hangs() {
   end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n");
 }
 
+void tell_in_force(const ServedModel& model) {
+  const std::string& id = model.model.provenance().id;
+  tell(LogLevel::kInfo, "model_in_force",
+       fmt::format("{}: version {} ({}) is in force", model.cell, model.version, id),
+       {{"cell", model.cell}, {"version", std::to_string(model.version)}, {"model", id}});
+}
+
 /// Serves until a signal ends it.
 Status serve(ServerConfig config, const Arguments& arguments) {
   CaughtSignals signals(hangs);  // before any thread of ours starts
@@ -298,10 +305,7 @@ Status serve(ServerConfig config, const Arguments& arguments) {
       },
       [&service](const ServedModel& model, bool in_force) {
         if (!in_force) return;
-        const std::string& id = model.model.provenance().id;
-        tell(LogLevel::kInfo, "model_in_force",
-             fmt::format("{}: version {} ({}) is in force", model.cell, model.version, id),
-             {{"cell", model.cell}, {"version", std::to_string(model.version)}, {"model", id}});
+        tell_in_force(model);
         service.publish_model(model.cell);
       },
       [](const std::string& trouble, bool over) {

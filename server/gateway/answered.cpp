@@ -200,16 +200,29 @@ Result<std::int64_t> checked(const GatewayAsk& ask, const CallAbout& about, Call
   return ask.calls.check(ask.from, about, batch_in(ask.http), tolerance, outcome);
 }
 
+Result<std::int64_t> trained(const GatewayAsk& ask, const CallAbout& about, CallOutcome& outcome) {
+  const nlohmann::json json = TRY(read_json_object(ask.http.body));
+  JsonReader body(json, "");
+  body.only({"batch_ids", "level", "bias", "change_id"});
+  const Training training{body.text("change_id"), body.texts("batch_ids"), body.text("level"),
+                          body.text("bias")};
+  TRY(body.status());
+  return ask.calls.train(ask.from, about, training, outcome);
+}
+
 Result<exchange::ModelInfo> activated(const GatewayAsk& ask, const CallAbout& about,
                                       CallOutcome& outcome) {
   const nlohmann::json json = TRY(read_json_object(ask.http.body));
   JsonReader body(json, "");
-  body.only({"version", "force", "expected_version", "reason", "change_id"});
   Activation change;
-  const auto version = body.integer("version");
-  if (!version) body.refuse("version", "a whole number");
-  change.version = version.value_or(0);
-  change.force = body.flag("force");
+  if (ask.route.route->endpoint == Endpoint::kRollback) {
+    body.only({"expected_version", "reason", "change_id"});
+  } else {
+    body.only({"version", "force", "expected_version", "reason", "change_id"});
+    change.version = body.integer("version");
+    if (!change.version) body.refuse("version", "a whole number");
+    change.force = body.flag("force");
+  }
   change.expected_version = body.integer("expected_version");
   change.reason = body.text("reason");
   change.change_id = body.text("change_id");
@@ -263,6 +276,8 @@ HttpReply answered_change(const GatewayAsk& ask) {
       return queued([&](CallOutcome& outcome) {
         return ask.calls.submit(ask.from, about, batch_in(ask.http), outcome);
       });
+    case Endpoint::kTrain:
+      return queued([&](CallOutcome& outcome) { return trained(ask, about, outcome); });
     case Endpoint::kDiagnose:
       return queued([&](CallOutcome& outcome) {
         return ask.calls.diagnose(ask.from, about, batch_in(ask.http), outcome);

@@ -19,10 +19,10 @@ table { border-collapse: collapse; } td, th { padding: 0.2em 0.8em; text-align: 
 .bad { color: #a00; }
 </style></head><body>
 <h1>Correct a program</h1>
-<p><label>Cell <input id="cell" required></label>
+<form id="about"><label>Cell <input id="cell" required></label>
 <label>Tool <input id="tool" placeholder="as the program says"></label>
 <label>Token <input id="token" type="password" placeholder="if the server asks for one"
- autocomplete="off"></label></p>
+ autocomplete="off"></label></form>
 <div id="drop"><p>Drop the files of one program here, or choose them:</p>
 <input id="files" type="file" multiple></div>
 <p id="state" role="status"></p>
@@ -88,6 +88,7 @@ async function correct(files) {
     tell('The server did not answer: ' + failed.message, true);
   }
 }
+at('about').onsubmit = event => event.preventDefault();
 at('files').onchange = () => correct(at('files').files);
 at('drop').ondragover = event => { event.preventDefault(); at('drop').className = 'over'; };
 at('drop').ondragleave = () => { at('drop').className = ''; };

@@ -87,30 +87,30 @@ std::optional<int> JsonReader::integer(const char* name) {
   return std::nullopt;
 }
 
-std::vector<double> JsonReader::numbers(const char* name) {
+template <typename Item>
+std::vector<Item> JsonReader::items(const char* name, bool (*good)(const nlohmann::json&),
+                                    const char* expected) {
   const nlohmann::json* value = find(name);
   if (value == nullptr) return {};
-  std::vector<double> numbers;
-  bool good = value->is_array();
-  for (const nlohmann::json& one : *value) {
-    good = good && one.is_number();
-    if (good) numbers.push_back(one.get<double>());
+  if (!value->is_array() || !std::all_of(value->begin(), value->end(), good)) {
+    refuse(name, expected);
+    return {};
   }
-  if (!good) refuse(name, "a list of numbers");
-  return numbers;
+  return value->get<std::vector<Item>>();
+}
+
+std::vector<double> JsonReader::numbers(const char* name) {
+  return items<double>(
+      name, [](const nlohmann::json& one) { return one.is_number(); }, "a list of numbers");
 }
 
 std::vector<int> JsonReader::integers(const char* name) {
-  const nlohmann::json* value = find(name);
-  if (value == nullptr) return {};
-  std::vector<int> numbers;
-  bool good = value->is_array();
-  for (const nlohmann::json& one : *value) {
-    good = good && is_integer(one);
-    if (good) numbers.push_back(one.get<int>());
-  }
-  if (!good) refuse(name, "a list of whole numbers");
-  return numbers;
+  return items<int>(name, is_integer, "a list of whole numbers");
+}
+
+std::vector<std::string> JsonReader::texts(const char* name) {
+  return items<std::string>(
+      name, [](const nlohmann::json& one) { return one.is_string(); }, "a list of texts");
 }
 
 const nlohmann::json& JsonReader::list(const char* name) {

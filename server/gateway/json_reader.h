@@ -30,6 +30,7 @@ class JsonReader {
   [[nodiscard]] std::optional<int> integer(const char* name);
   [[nodiscard]] std::vector<double> numbers(const char* name);
   [[nodiscard]] std::vector<int> integers(const char* name);
+  [[nodiscard]] std::vector<std::string> texts(const char* name);
   /// Refuses a list that is missing.
   [[nodiscard]] const nlohmann::json& list(const char* name);
   void refuse(const char* name, const std::string& expected);
@@ -38,6 +39,9 @@ class JsonReader {
 
  private:
   [[nodiscard]] const nlohmann::json* find(const char* name) const;
+  template <typename Item>
+  [[nodiscard]] std::vector<Item> items(const char* name, bool (*good)(const nlohmann::json&),
+                                        const char* expected);
 
   const nlohmann::json& object_;
   const std::string where_;

@@ -108,7 +108,16 @@ ordered_json asked_schemas() {
                                          {"expected_version", typed("integer")},
                                          {"reason", typed("string")},
                                          {"change_id", typed("string")}},
-                                        1)}};
+                                        1)},
+          {"RollbackRequest", object_of({{"expected_version", typed("integer")},
+                                         {"reason", typed("string")},
+                                         {"change_id", typed("string")}},
+                                        0)},
+          {"TrainRequest", object_of({{"batch_ids", list_of(typed("string"))},
+                                      {"level", typed("string")},
+                                      {"bias", typed("string")},
+                                      {"change_id", typed("string")}},
+                                     0)}};
 }
 
 ordered_json told_schemas() {

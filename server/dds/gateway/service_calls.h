@@ -34,10 +34,17 @@ struct SentBatch {
   std::string csv;
 };
 
+/// A training from batches that are stored.
+struct Training {
+  std::string change_id;               ///< as SentBatch::change_id
+  std::vector<std::string> batch_ids;  ///< none: the newest batch
+  std::string level, bias;             ///< empty: as the cell file says
+};
+
 /// A version to put in force.
 struct Activation {
-  std::string change_id;  ///< as SentBatch::change_id
-  int version = 0;
+  std::string change_id;             ///< as SentBatch::change_id
+  std::optional<int> version = {};   ///< empty: back to the one in force before
   bool force = false;                        ///< also one that is worse on the poses held out
   std::optional<int> expected_version = {};  ///< that must be in force; otherwise kConflict
   std::string reason = {};                   ///< for the audit trail
@@ -69,6 +76,9 @@ class ServiceCalls {
   [[nodiscard]] virtual Result<std::int64_t> submit(const CallFrom& from, const CallAbout& about,
                                                     const SentBatch& batch,
                                                     CallOutcome& outcome) = 0;
+  [[nodiscard]] virtual Result<std::int64_t> train(const CallFrom& from, const CallAbout& about,
+                                                   const Training& training,
+                                                   CallOutcome& outcome) = 0;
   [[nodiscard]] virtual Result<std::int64_t> diagnose(const CallFrom& from, const CallAbout& about,
                                                       const SentBatch& batch,
                                                       CallOutcome& outcome) = 0;
