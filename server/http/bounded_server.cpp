@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <deque>
 #include <exception>
@@ -170,6 +171,20 @@ std::optional<HttpReply> refused_request(const httplib::Request& request,
   return limits.posts->admission ? limits.posts->admission(ask_in(request)) : std::nullopt;
 }
 
+/// True if the connection may have another request: the client wants it, and the answer is given
+/// when all of this one has been read.
+bool may_stay(const httplib::Request& request, const HttpLimits& limits) {
+  if (request.version != "HTTP/1.1" || lower(request.get_header_value("Connection")) == "close" ||
+      refused_request(request, limits))
+    return false;
+  const std::string length = request.get_header_value("Content-Length");
+  if (request.method != "POST") return length.empty() && !request.has_header("Transfer-Encoding");
+  std::size_t bytes = 0;
+  const auto [end, error] = std::from_chars(length.data(), length.data() + length.size(), bytes);
+  return error == std::errc() && end == length.data() + length.size() &&
+         request.get_header_value_count("Content-Length") == 1 && bytes <= limits.posts->body;
+}
+
 void put_reply(HttpReply reply, httplib::Response& response) {
   response.status = reply.code;
   for (const auto& [name, value] : reply.headers) response.set_header(name, value);
@@ -197,9 +212,11 @@ class BoundedServer::Running final : public httplib::Server {
       apart_[word] = std::make_unique<Workers>(
           1, limits_.waiting, [this](int socket) { serve(socket, limits_.reading); });
     if (limits_.posts)
-      apart_[limits_.posts->word] =
-          std::make_unique<Workers>(limits_.posts->workers, limits_.waiting,
-                                    [this](int socket) { serve(socket, limits_.posts->reading); });
+      apart_[limits_.posts->word] = std::make_unique<Workers>(
+          limits_.posts->workers, limits_.waiting, [this](int socket) { serve_and_keep(socket); });
+    set_tcp_nodelay(true);
+    set_keep_alive_timeout(Incoming::kIdle.count());  // what clients are told
+    set_keep_alive_max_count(1'000'000);
     new_task_queue = [] { return new AtOnce; };
     // By default it would share the port with another listener.
     set_socket_options([](int socket) {
@@ -220,6 +237,7 @@ class BoundedServer::Running final : public httplib::Server {
   ~Running() override {
     stop();
     thread_ = {};
+    incoming_.stop();
   }
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
@@ -258,12 +276,24 @@ class BoundedServer::Running final : public httplib::Server {
   void serve(int socket, std::chrono::milliseconds reading) {
     DeadlineStream stream(socket, reading, limits_.writing, limits_.tls);
     bool closed = false;
-    // One request per connection, neither compressed nor in pieces. Both would cost work, and all
-    // clients are on this host.
-    process_request(stream, true, closed, [](httplib::Request& request) {
-      request.headers.erase("Accept-Encoding");
-      request.ranges.clear();
+    process_request(stream, true, closed, take_plain);
+  }
+  /// Where a program asks again and again, a connection for each request would cost the most.
+  void serve_and_keep(int socket) {
+    DeadlineStream stream(socket, limits_.posts->reading, limits_.writing, limits_.tls);
+    bool closed = false, stays = false;
+    process_request(stream, limits_.tls != nullptr, closed, [&](httplib::Request& request) {
+      take_plain(request);
+      stays = !limits_.tls && may_stay(request, limits_);
+      request.headers.erase("Connection");
+      if (!stays) request.headers.emplace("Connection", "close");  // what the library goes by
     });
+    if (const auto kept = stays ? stream.released() : std::nullopt) incoming_.keep(*kept);
+  }
+  /// Neither compressed nor in pieces: both would cost work.
+  static void take_plain(httplib::Request& request) {
+    request.headers.erase("Accept-Encoding");
+    request.ranges.clear();
   }
   void give(int socket, const std::string& head) {
     const auto own =
@@ -279,12 +309,13 @@ class BoundedServer::Running final : public httplib::Server {
   const HttpLimits limits_;
   const HttpHandler handler_;
   std::atomic<std::uint64_t> shed_{0};
-  Workers workers_{limits_.workers, limits_.waiting,
-                   [this](int socket) { serve(socket, limits_.reading); }};
-  std::map<std::string, std::unique_ptr<Workers>> apart_;  // by the first word of the path
+  // Outlives the workers, which give connections back to it; stops before they end.
   Incoming incoming_{limits_.waiting, limits_.reading,
                      [this](int socket, const std::string& head) { give(socket, head); },
                      [this](int socket) { shed(socket); }, limits_.tls != nullptr};
+  Workers workers_{limits_.workers, limits_.waiting,
+                   [this](int socket) { serve(socket, limits_.reading); }};
+  std::map<std::string, std::unique_ptr<Workers>> apart_;  // by the first word of the path
   std::jthread thread_;
 };
 

@@ -36,7 +36,8 @@ struct HttpLimits {
   bool stays_here = true;               ///< false: other hosts may ask
 };
 
-/// A server of HTTP/1.1 for GET and HEAD, and for POST below one word, one request per connection.
+/// A server of HTTP/1.1 for GET and HEAD, and for POST below one word. Below that word a connection
+/// may have one request after the other, without TLS; elsewhere it has one.
 /// It has a fixed number of threads of low priority, bounded queues, and a time limit for each
 /// request. A client that sends slowly holds up nobody. A client that reads slowly holds up only
 /// other readers that share its workers. Neither affects the rest of the process. Where only this

@@ -35,8 +35,15 @@ DeadlineStream::DeadlineStream(int socket, std::chrono::milliseconds reading,
 }
 
 DeadlineStream::~DeadlineStream() {
+  if (released_) return;
   if (tls_) ::SSL_shutdown(tls_.get());
   close_with_words(socket_);
+}
+
+std::optional<int> DeadlineStream::released() {
+  if (tls_ || broken_ || from_ < to_) return std::nullopt;
+  released_ = true;
+  return socket_;
 }
 
 bool DeadlineStream::wait(short events, Clock::time_point until) const {
@@ -57,9 +64,9 @@ bool DeadlineStream::is_writable() const { return wait(POLLOUT, Clock::now() + w
 ssize_t DeadlineStream::read(char* bytes, std::size_t size) {
   while (from_ == to_) {
     const ssize_t got = get(buffer_.data(), buffer_.size());
-    if (got == 0) return 0;
     if (got == kWaits && wait(wanted_, read_until_)) continue;
-    if (got < 0) return -1;
+    broken_ = broken_ || got <= 0;
+    if (got <= 0) return got == 0 ? 0 : -1;
     from_ = 0;
     to_ = static_cast<std::size_t>(got);
   }
@@ -74,7 +81,9 @@ ssize_t DeadlineStream::write(const char* bytes, std::size_t size) {
   for (;;) {
     const ssize_t gone = put(bytes, size);
     if (gone >= 0) return gone;
-    if (gone != kWaits || !wait(wanted_, write_until_)) return -1;
+    if (gone == kWaits && wait(wanted_, write_until_)) continue;
+    broken_ = true;
+    return -1;
   }
 }
 

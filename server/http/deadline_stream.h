@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/http/tls.h"
@@ -34,6 +35,10 @@ class DeadlineStream final : public httplib::Stream {
   void get_local_ip_and_port(std::string& ip, int& port) const override;
   [[nodiscard]] int socket() const override { return socket_; }
 
+  /// The connection, for its next request: it is open, and nothing of it is left unread here.
+  /// Otherwise, and with TLS, nothing, and it is closed at the end.
+  [[nodiscard]] std::optional<int> released();
+
  private:
   /// Until the socket is ready for `events`; false once `until` is over.
   [[nodiscard]] bool wait(short events, Clock::time_point until) const;
@@ -46,6 +51,7 @@ class DeadlineStream final : public httplib::Stream {
   static constexpr ssize_t kWaits = -2;
 
   const int socket_;
+  bool broken_ = false, released_ = false;
   const std::unique_ptr<SSL, void (*)(SSL*)> tls_;  // null: without
   short wanted_ = 0;                                // of poll()
   const Clock::time_point read_until_;

@@ -76,43 +76,59 @@ Incoming::Incoming(std::size_t most, std::chrono::milliseconds patience, Come co
 }
 
 Incoming::~Incoming() {
-  thread_.request_stop();
-  wake();
-  thread_.join();
-  const MutexLock lock(mutex_);
-  for (const Slow& one : slow_) pushed_out_(one.socket);
+  stop();
   ::close(wakes_);
   ::close(epoll_);
 }
 
+void Incoming::stop() {
+  if (!thread_.joinable()) return;
+  thread_.request_stop();
+  wake();
+  thread_.join();
+  const MutexLock lock(mutex_);
+  stopped_ = true;
+  for (const Slow& one : slow_) one.kept ? close_at_once(one.socket) : pushed_out_(one.socket);
+  slow_.clear();
+}
+
 // On one host the request is mostly there when the connection is: then it never waits here.
-void Incoming::add(int socket) {
+void Incoming::add(int socket) { wait_for(socket, patience_, false); }
+
+void Incoming::keep(int socket) { wait_for(socket, kIdle, true); }
+
+void Incoming::wait_for(int socket, std::chrono::milliseconds patience, bool kept) {
   const Head head = head_of(socket);
-  if (head.arrival != Head::kNotYet) return take(socket, head);
-  std::optional<int> out;
+  std::optional<Slow> out;
   {
     const MutexLock lock(mutex_);
-    out = make_room();
-    slow_.push_back({socket, std::chrono::steady_clock::now()});
-    epoll_event event{EPOLLIN | EPOLLRDHUP | EPOLLET, {.fd = socket}};
-    ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket, &event);
+    if (stopped_) return close_at_once(socket);
+    if (head.arrival == Head::kNotYet) {
+      out = make_room();
+      slow_.push_back({socket, std::chrono::steady_clock::now() + patience, kept});
+      epoll_event event{EPOLLIN | EPOLLRDHUP | EPOLLET, {.fd = socket}};
+      ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket, &event);
+    }
   }
+  if (head.arrival != Head::kNotYet) return take(socket, head);
   if (out) send_out(*out);
   wake();
 }
-
-std::optional<int> Incoming::make_room() {
+std::optional<Incoming::Slow> Incoming::make_room() {
   if (slow_.size() < most_ || slow_.empty()) return std::nullopt;
-  const int out = slow_.front().socket;
-  slow_.erase(slow_.begin());
-  ::epoll_ctl(epoll_, EPOLL_CTL_DEL, out, nullptr);
+  auto one = std::find_if(slow_.begin(), slow_.end(), [](const Slow& any) { return any.kept; });
+  if (one == slow_.end()) one = slow_.begin();
+  const Slow out = *one;
+  slow_.erase(one);
+  ::epoll_ctl(epoll_, EPOLL_CTL_DEL, out.socket, nullptr);
   return out;
 }
 
 // Its request may have come just now.
-void Incoming::send_out(int socket) const {
-  const Head head = head_of(socket);
-  head.arrival == Head::kNotYet ? pushed_out_(socket) : take(socket, head);
+void Incoming::send_out(const Slow& one) const {
+  const Head head = head_of(one.socket);
+  if (head.arrival != Head::kNotYet) return take(one.socket, head);
+  one.kept ? close_at_once(one.socket) : pushed_out_(one.socket);
 }
 
 void Incoming::watch(const std::stop_token& stop) {
@@ -153,7 +169,7 @@ void Incoming::close_late() {
   const MutexLock lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
   std::erase_if(slow_, [&](const Slow& one) {
-    if (now - one.since < patience_) return false;
+    if (now < one.until) return false;
     close_at_once(one.socket);  // which also removes it from epoll
     return true;
   });

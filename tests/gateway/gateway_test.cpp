@@ -75,9 +75,10 @@ class GatewayTest : public testing::Test {
   }
 
   HttpAnswer send(const Sent& sent) const {
-    std::string text = sent.method + " " + sent.path +
-                       " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port_) + "\r\n" +
-                       sent.headers;
+    std::string text =
+        sent.method + " " + sent.path +
+        " HTTP/1.1\r\nConnection: close\r\nHost: 127.0.0.1:" + std::to_string(port_) + "\r\n" +
+        sent.headers;
     if (sent.method == "POST")
       text += "Content-Type: " + sent.type +
               "\r\nContent-Length: " + std::to_string(sent.body.size()) + "\r\n";

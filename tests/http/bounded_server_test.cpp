@@ -67,7 +67,8 @@ TEST_F(BoundedServerTest, ABodyIsTakenOnlyBelowItsWordAndOnlyWhole) {
   const auto post = [](const std::string& path, const std::string& headers,
                        const std::string& body) {
     return parse_http(http_exchange(
-        kPort, "POST " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n" + body));
+        kPort, "POST " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" + headers +
+                   "\r\n" + body));
   };
   const std::string json = "Content-Type: application/json\r\n";
   EXPECT_EQ(post("/api/a", json + "Content-Length: 3\r\n", "abc").body, "abc");
@@ -79,6 +80,80 @@ TEST_F(BoundedServerTest, ABodyIsTakenOnlyBelowItsWordAndOnlyWhole) {
             415);
   EXPECT_EQ(post("/api/a", "Content-Type: text/plain\r\nContent-Length: 3\r\n", "abc").code, 415)
       << "any page could send that";
+}
+
+/// A server that gives back what is posted, by one worker.
+HttpLimits echoing_limits() {
+  HttpLimits limits;
+  limits.posts = HttpPosts();
+  limits.posts->word = "api";
+  limits.posts->workers = 1;
+  limits.posts->body = 64;
+  return limits;
+}
+
+HttpReply echo_body(const HttpAsk& ask) { return {200, "text/plain", ask.body}; }
+
+std::string post_of(const std::string& body, const std::string& type = "application/json") {
+  return "POST /api/a HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: " + type +
+         "\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
+}
+
+/// The answer whose end is known by `body`, on a connection that stays open.
+std::string read_until(const OpenConnection& connection, const std::string& body) {
+  std::string bytes;
+  const auto until = std::chrono::steady_clock::now() + seconds(10);
+  while (!bytes.ends_with(body) && std::chrono::steady_clock::now() < until)
+    bytes += connection.read(milliseconds(5));
+  return bytes;
+}
+
+// One worker would be held up by one idle client if that client kept it.
+TEST_F(BoundedServerTest, AConnectionHasManyRequestsAndOccupiesNoWorkerBetweenThem) {
+  start(echoing_limits(), echo_body);
+  const OpenConnection first(kPort), second(kPort);
+  for (const char* body : {"one", "two", "three"}) {
+    for (const OpenConnection* connection : {&first, &second}) {
+      connection->send(post_of(body));
+      const std::string answer = read_until(*connection, body);
+      EXPECT_EQ(parse_http(answer).body, body);
+      EXPECT_EQ(answer.find("Connection: close"), std::string::npos) << answer;
+    }
+  }
+  server_.reset();
+  EXPECT_TRUE(first.closes_within(seconds(10)));
+}
+
+// What is left of a refused request must not be taken for the next one.
+TEST_F(BoundedServerTest, TheUnreadBodyOfARefusedRequestIsNoRequest) {
+  start(echoing_limits(), echo_body);
+  const std::string hidden = post_of("hidden");
+  const std::string long_one = hidden + std::string(200, ' ');
+  for (const std::string& sent : {post_of(hidden, "text/plain"), post_of(long_one)}) {
+    const std::string answers = http_exchange(kPort, sent);
+    EXPECT_EQ(answers.find("hidden"), std::string::npos) << answers;
+    EXPECT_NE(answers.find("Connection: close"), std::string::npos) << answers;
+  }
+  const std::string twice =
+      "POST /api/a HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+      "Content-Length: 3\r\nContent-Length: 300\r\n\r\nabc";
+  EXPECT_NE(http_exchange(kPort, twice + hidden).find("Connection: close"), std::string::npos);
+}
+
+TEST_F(BoundedServerTest, AnIdleConnectionMakesRoomForANewOne) {
+  HttpLimits limits = echoing_limits();
+  limits.waiting = 2;
+  start(limits, echo_body);
+  const OpenConnection idle(kPort), other(kPort);
+  for (const OpenConnection* connection : {&idle, &other}) {
+    connection->send(post_of("x"));
+    EXPECT_EQ(parse_http(read_until(*connection, "x")).code, 200);
+  }
+  const OpenConnection late(kPort);
+  EXPECT_TRUE(idle.closes_within(seconds(5)));
+  EXPECT_EQ(server_->shed(), 0u);
+  late.send(post_of("y"));
+  EXPECT_EQ(parse_http(read_until(late, "y")).body, "y");
 }
 
 TEST_F(BoundedServerTest, AnswersToNamesOfThisHostOnly) {

@@ -43,8 +43,8 @@ struct Training {
 
 /// A version to put in force.
 struct Activation {
-  std::string change_id;             ///< as SentBatch::change_id
-  std::optional<int> version = {};   ///< empty: back to the one in force before
+  std::string change_id;                     ///< as SentBatch::change_id
+  std::optional<int> version = {};           ///< empty: back to the one in force before
   bool force = false;                        ///< also one that is worse on the poses held out
   std::optional<int> expected_version = {};  ///< that must be in force; otherwise kConflict
   std::string reason = {};                   ///< for the audit trail
