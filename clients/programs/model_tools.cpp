@@ -5,6 +5,7 @@
 
 #include "server/compensate/model_notes.h"
 #include "server/robot/cell_rules.h"
+#include "server/robot/joint_pulses.h"
 
 namespace trammel::cam {
 
@@ -41,6 +42,13 @@ exchange::ModelInfo info_of(const CompensatedModel& model) {
   info.training_poses = provenance.training_poses;
   info.notes = notes_of(model);
   return info;
+}
+
+Result<std::vector<double>> pulses_of_job(const Cell& cell) {
+  constexpr std::size_t kAxes = 6;
+  std::vector<double> pulses = TRY(joint_pulses(cell));
+  if (pulses.size() != kAxes) pulses.clear();
+  return pulses;
 }
 
 Failure no_motion_in(const std::vector<SourceFile>& files, Dialect dialect,

@@ -25,6 +25,10 @@ struct ToolAndPayload {
                                                             const std::string& tool,
                                                             const std::string& payload);
 
+/// Pulses of a degree of the six axes of a Yaskawa job, from the cell's robot file; empty: it has
+/// none, or a rail, which has no place among the six axes of a job.
+[[nodiscard]] Result<std::vector<double>> pulses_of_job(const Cell& cell);
+
 /// The refusal of files in which no motion of this dialect was found. `where` names them.
 [[nodiscard]] Failure no_motion_in(const std::vector<SourceFile>& files, Dialect dialect,
                                    const std::string& where);

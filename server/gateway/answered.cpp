@@ -132,12 +132,13 @@ Result<ServedModelPtr> model_for_programs(const GatewayAsk& ask) {
 Result<SentProgram> program_in(const std::string& text) {
   const nlohmann::json json = TRY(read_json_object(text));
   JsonReader body(json, "");
-  body.only({"files", "format", "tool", "payload", "keep_digits"});
+  body.only({"files", "format", "tool", "payload", "keep_digits", "frames"});
   SentProgram program;
   program.format = body.text("format");
   program.tool = body.text("tool");
   program.payload = body.text("payload");
   program.keep_digits = body.flag("keep_digits");
+  program.frames = body.text("frames");
   for (const nlohmann::json& one : body.list("files")) {
     JsonReader file(one, fmt::format("file {}", program.files.size() + 1));
     file.only({"name", "base64"});
@@ -177,7 +178,8 @@ HttpReply corrected_file(const GatewayAsk& ask) {
                       http.option("format"),
                       http.option("tool"),
                       http.option("payload"),
-                      http.option("keep_digits") == "true"};
+                      http.option("keep_digits") == "true",
+                      {}};
   CallOutcome outcome;
   const auto done =
       correct_sent_program(ask.calls, ask.from, **served, std::move(program), ask.version, outcome);

@@ -10,7 +10,8 @@
 namespace trammel {
 namespace {
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();  // the service refuses it
+constexpr double kMissing =
+    std::numeric_limits<double>::quiet_NaN();  // is refused before the service is asked
 
 std::vector<double> joints_in(JsonReader& item, const exchange::Rails& rails) {
   std::vector<double> joints = item.numbers("joints_deg");
@@ -25,7 +26,10 @@ exchange::Approach approach_in(JsonReader& item) {
 }
 
 exchange::Pose pose_in(JsonReader& item) {
-  const auto read = [&](const char* name) { return item.number(name).value_or(kMissing); };
+  const auto read = [&](const char* name) {
+    if (!item.has(name)) item.refuse(name, "a number");
+    return item.number(name).value_or(kMissing);
+  };
   return {{read("x_mm"), read("y_mm"), read("z_mm")},
           {read("qw"), read("qx"), read("qy"), read("qz")}};
 }

@@ -8,6 +8,7 @@
 
 #include "clients/cam/dialect.h"
 #include "clients/cam/encoding.h"
+#include "clients/programs/given_poses.h"
 #include "clients/programs/model_tools.h"
 #include "server/base/unix_time.h"
 
@@ -66,6 +67,23 @@ cam::AskCorrections ask_service(ServiceCalls& calls, const CallFrom& from,
   };
 }
 
+/// As the command line reads the same files.
+Result<cam::Program> understood(const SentProgram& program, cam::Dialect dialect,
+                                const Cell& cell) {
+  constexpr const char* kFrames = "frames";
+  cam::ReadOptions options;
+  std::vector<cam::GivenPose> rows;
+  if (!program.frames.empty()) rows = TRY(cam::read_given_poses(program.frames, kFrames));
+  for (const cam::GivenPose& row : rows) options.frames.emplace(row.name, row.X);
+  if (dialect == cam::Dialect::kInform) options.pulses_per_deg = TRY(cam::pulses_of_job(cell));
+  cam::Program read = cam::read_program(dialect, program.files, options);
+  TRY(cam::check_files(read));
+  if (!read.is_understood())
+    return cam::no_motion_in(program.files, dialect, program.files.front().name);
+  TRY(cam::check_used(rows, kFrames, read, dialect));
+  return read;
+}
+
 }  // namespace
 
 Result<ReturnedProgram> correct_sent_program(ServiceCalls& calls, const CallFrom& from,
@@ -79,10 +97,7 @@ Result<ReturnedProgram> correct_sent_program(ServiceCalls& calls, const CallFrom
     file.text = std::move(text.text);
     encodings.push_back(text.encoding);
   }
-  const cam::Program read = cam::read_program(dialect, program.files, {});
-  TRY(cam::check_files(read));
-  if (!read.is_understood())
-    return cam::no_motion_in(program.files, dialect, program.files.front().name);
+  const cam::Program read = TRY(understood(program, dialect, served.model.cell()));
   const cam::CorrectProgramOptions options{program.tool, program.payload, program.keep_digits,
                                            version, date_of_today()};
   ReturnedProgram returned;

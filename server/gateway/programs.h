@@ -16,6 +16,7 @@ struct SentProgram {
   std::string format;                  ///< of --format; empty: by the ending of the first name
   std::string tool, payload;           ///< of the cell; empty: as the program says
   bool keep_digits = false;
+  std::string frames;  ///< the table of given_poses.h; empty: none
 };
 
 struct ReturnedProgram {

@@ -21,6 +21,7 @@
 #include "server/base/mutex.h"
 #include "server/http/deadline_stream.h"
 #include "server/http/incoming.h"
+#include "server/http/refusal.h"
 
 namespace trammel {
 namespace {
@@ -148,26 +149,40 @@ bool is_post_below(const std::optional<HttpPosts>& posts, const httplib::Request
   return posts && request.method == "POST" && first_word(request.target) == posts->word;
 }
 
+/// In the form that fits the address: JSON below the word of `posts`, words elsewhere.
+HttpReply refused_as(const HttpLimits& limits, const httplib::Request& request, int code,
+                     const Failure& why) {
+  if (limits.posts && first_word(request.target) == limits.posts->word)
+    return refusal(code, why.value());
+  return {code, kPlain, why.value().message + "\n"};
+}
+
 /// Why a request is not even looked at. A body must say how long it is and come as it is: the
 /// library does not limit one in pieces or one that grows when it is unpacked.
 std::optional<HttpReply> refused_request(const httplib::Request& request,
                                          const HttpLimits& limits) {
+  const auto refused_with = [&](int code, ErrorCode kind, const char* why) {
+    return refused_as(limits, request, code, failure(kind, "{}", why));
+  };
   const bool posts = is_post_below(limits.posts, request);
-  if (request.method != "GET" && request.method != "HEAD" && !posts)
-    return HttpReply{405, kPlain, "nothing can be changed here\n", {{"Allow", "GET, HEAD"}}};
+  if (request.method != "GET" && request.method != "HEAD" && !posts) {
+    HttpReply reply = refused_with(405, ErrorCode::kUsage, "nothing can be changed here");
+    reply.headers["Allow"] = "GET, HEAD";
+    return reply;
+  }
   if (request.target.size() > kLongestUri || (posts && request.path.size() > kLongestPostPath))
-    return HttpReply{414, kPlain, "the address is too long\n"};
+    return refused_with(414, ErrorCode::kTooLarge, "the address is too long");
   if (limits.stays_here && !is_of_this_host(request.get_header_value("Host")))
-    return HttpReply{421, kPlain, "ask for 127.0.0.1 or localhost\n"};
+    return refused_with(421, ErrorCode::kUsage, "ask for 127.0.0.1 or localhost");
   if (!posts) return std::nullopt;
   if (request.has_header("Transfer-Encoding") || !request.has_header("Content-Length"))
-    return HttpReply{411, kPlain, "say Content-Length, and send no pieces\n"};
+    return refused_with(411, ErrorCode::kUsage, "say Content-Length, and send no pieces");
   const std::string type = request.get_header_value("Content-Type");
   const std::string kind = type.substr(0, type.find(';'));
   if (request.has_header("Content-Encoding") ||
       (kind != "application/json" && kind != "application/octet-stream" && kind != "text/csv"))
-    return HttpReply{415, kPlain,
-                     "send application/json, text/csv or application/octet-stream, not packed\n"};
+    return refused_with(415, ErrorCode::kUsage,
+                        "send application/json, text/csv or application/octet-stream, not packed");
   return limits.posts->admission ? limits.posts->admission(ask_in(request)) : std::nullopt;
 }
 
@@ -261,10 +276,12 @@ class BoundedServer::Running final : public httplib::Server {
       ask.body = request.body;
       put_reply(guarded_reply(handler_, ask), response);
     });
-    set_error_handler([this](const httplib::Request&, httplib::Response& response) {
+    set_error_handler([this](const httplib::Request& request, httplib::Response& response) {
       if (!response.body.empty() || response.status != 413) return;
-      put_reply({413, kPlain,
-                 "more than " + std::to_string(limits_.posts->body) + " bytes in one request\n"},
+      const std::size_t most = limits_.posts->body;
+      put_reply(refused_as(limits_, request, 413,
+                           failure(ErrorCode::kTooLarge, "more than {} bytes in one request", most)
+                               .beyond(most, most)),
                 response);
     });
   }

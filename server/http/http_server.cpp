@@ -10,6 +10,7 @@
 #include "server/http/metrics.h"
 #include "server/http/pages.h"
 #include "server/http/readiness.h"
+#include "server/http/refusal.h"
 
 namespace trammel {
 namespace {
@@ -26,11 +27,9 @@ HttpReply json_reply(int code, const nlohmann::ordered_json& json) {
 const Asker kAnybody{"http", Role::kEngineer};
 
 HttpReply who_are_you(bool api) {
-  nlohmann::ordered_json told = {{"error",
-                                  {{"code", "refused"},
-                                   {"message", "no token that this server knows"},
-                                   {"next", "send Authorization: Bearer TOKEN"}}}};
-  HttpReply reply = json_reply(401, told);
+  HttpReply reply = refusal(
+      401,
+      refused("no token that this server knows").next("send Authorization: Bearer TOKEN").value());
   reply.headers["WWW-Authenticate"] = api ? "Bearer" : "Basic realm=\"trammel\"";
   return reply;
 }
@@ -129,11 +128,10 @@ class HttpServer::Running {
 
   std::optional<HttpReply> admit(HttpAsk ask) const {
     if (is_from_another_site(ask))
-      return json_reply(403, {{"error",
-                               {{"code", "refused"},
-                                {"message", "a page of another site asks"},
-                                {"field", "Origin"},
-                                {"text", ask.header("origin")}}}});
+      return refusal(403, refused("a page of another site asks")
+                              .of("Origin")
+                              .with_text(ask.header("origin"))
+                              .value());
     if (auto refused = refused_asker(ask)) return refused;
     return options_.api && api_.admission ? api_.admission(ask) : std::nullopt;
   }
@@ -143,7 +141,7 @@ class HttpServer::Running {
     if (auto refused = refused_asker(ask)) return *refused;
     if (is_api(ask) && options_.api && api_.answer) {
       if (phase == ServerPhase::kServing) return api_.answer(ask);
-      return json_reply(503, {{"error", {{"code", "busy"}, {"message", "not up"}}}});
+      return refusal(503, failure(ErrorCode::kBusy, "the service does not run").value());
     }
     if (ask.path.size() != 1) return pages_.answer(ask, phase);
     if (ask.path[0] == "healthz") return health();

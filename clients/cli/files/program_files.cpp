@@ -15,14 +15,12 @@
 #include "clients/cam/mark.h"
 #include "clients/cam/stated_robot.h"
 #include "clients/cli/files/controller_files.h"
+#include "clients/programs/given_poses.h"
 #include "clients/programs/model_tools.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
-#include "server/base/units.h"
 #include "server/compensate/model_file.h"
-#include "server/measurement/files/csv_table.h"
-#include "server/robot/joint_pulses.h"
 
 namespace trammel::cli {
 
@@ -206,77 +204,6 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
 
 namespace {
 
-/// A row of --frames.
-struct GivenPose {
-  std::string name;
-  Pose X;
-  int line = 0;
-  bool may_be_unused = false;  ///< its row may belong to other programs
-};
-
-Result<bool> may_be_unused(const CsvTable& table, std::size_t row) {
-  const auto column = table.find("may_be_unused");
-  const std::string said = column ? table.field(row, *column) : "no";
-  if (said == "yes" || said == "no") return said == "yes";
-  return table.refuse(row, "may_be_unused is {}, expected yes or no", shown_short(said))
-      .of("may_be_unused");
-}
-
-Result<std::vector<GivenPose>> read_frames_csv(const std::string& path) {
-  const std::string text = TRY(read_text_file(path));
-  const CsvTable table = TRY(CsvTable::parse(text, path));
-  const std::size_t name = TRY(table.require("name"));
-  const auto columns = TRY(table.all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"}));
-  if (columns.empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
-  std::vector<GivenPose> rows;
-  std::set<std::string> names;
-  for (std::size_t row = 0; row < table.size(); ++row) {
-    Vector3 p;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double value = TRY(table.number(row, columns[k], 1e6));
-      p(static_cast<Eigen::Index>(k)) = from_mm(value);
-    }
-    const Matrix3 R = TRY(table.rotation(row, {columns.begin() + 3, columns.end()}));
-    const bool spare = TRY(may_be_unused(table, row));
-    rows.push_back({table.field(row, name), make_pose(R, p), table.line(row), spare});
-    if (!names.insert(rows.back().name).second)
-      return table.refuse(row, "{} is there twice", shown_short(rows.back().name)).of("name");
-  }
-  return rows;
-}
-
-/// Refuses rows without effect on the program, since their author expects one.
-Status check_used(const std::vector<GivenPose>& rows, const std::string& path,
-                  const cam::Program& program, cam::Dialect dialect) {
-  const cam::FramesRows known = cam::rows_of(program);
-  std::vector<Error> problems;
-  for (const GivenPose& row : rows) {
-    const bool spelled = cam::may_have_row(dialect, row.name);
-    // The frame of an item that is left alone is not searched.
-    const bool hidden = spelled && !program.left.empty() && known.open.empty();
-    if (row.may_be_unused || hidden || known.used.contains(row.name)) continue;
-    std::set<std::string> names = known.used;
-    names.insert(known.open.begin(), known.open.end());
-    problems.push_back(
-        refused("{}: {}", shown_short(row.name),
-                spelled ? "nothing in the program uses it"
-                        : fmt::format("a {} program has no such name", cam::name_of(dialect)))
-            .in(path)
-            .at_row(row.line)
-            .of("name")
-            .with_text(row.name)
-            .next(
-                fmt::format("its names are: {}", shown(fmt::format("{}", fmt::join(names, ", ")))))
-            .value());
-  }
-  if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
-  return {};
-}
-
-}  // namespace
-
-namespace {
-
 /// Six numbers, of a Yaskawa job.
 Status check_pulses(const ProgramFiles& files, const std::vector<double>& pulses_per_deg) {
   constexpr std::size_t kAxes = 6;
@@ -316,14 +243,15 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   const auto robots = TRY(robots_of(files));
   for (const cam::ControllerRobot& robot : robots)
     cam::take_stated(cam::stated_by(robot), options.stated);
-  std::vector<GivenPose> rows;
+  std::vector<cam::GivenPose> rows;
   options.beside = files.beside;
   if (is_listing(frames)) {
     options.beside.push_back(TRY(read_listing(frames, files.dialect)));
   } else if (!frames.empty()) {
-    rows = TRY(read_frames_csv(frames));
+    const std::string text = TRY(read_text_file(frames));
+    rows = TRY(cam::read_given_poses(text, frames));
   }
-  for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
+  for (const cam::GivenPose& row : rows) options.frames.emplace(row.name, row.X);
   cam::Program program = cam::read_program(files.dialect, files.files, options);
   TRY(cam::check_files(program));
   for (const cam::ControllerRobot& robot : robots) {
@@ -335,7 +263,7 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   program.notes.insert(program.notes.end(), files.not_read.begin(), files.not_read.end());
   TRY(cam::take_idle_axes(program, options.idle_axes));
   if (program.is_understood()) {
-    TRY(check_used(rows, frames, program, files.dialect));
+    TRY(cam::check_used(rows, frames, program, files.dialect));
     return program;
   }
   return cam::no_motion_in(files.files, files.dialect,
@@ -345,10 +273,7 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
 Status take_pulses(const ProgramFiles& files, const std::string& model, cam::ReadOptions& options) {
   if (files.dialect != cam::Dialect::kInform || !options.pulses_per_deg.empty()) return {};
   const CompensatedModel of_robot = TRY(load_model(model));
-  constexpr std::size_t kAxes = 6;
-  std::vector<double> pulses = TRY(joint_pulses(of_robot.cell()));
-  // A rail in the robot file has no place among the six axes of a job.
-  if (pulses.size() == kAxes) options.pulses_per_deg = std::move(pulses);
+  options.pulses_per_deg = TRY(cam::pulses_of_job(of_robot.cell()));
   return {};
 }
 

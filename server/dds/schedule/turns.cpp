@@ -68,8 +68,8 @@ std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost ow
   }
   if (requests_ >= limits_.requests) return full(fmt::format("{} requests wait", requests_));
   const auto cell = cells_.find(ask.cell);
-  const auto cell_limit =
-      static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.requests));
+  const auto cell_limit = std::max<std::size_t>(
+      1, static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.requests)));
   if (cell != cells_.end() && cell->second.requests >= cell_limit) {
     return full(fmt::format("{} requests of this cell wait", cell->second.requests));
   }
