@@ -10,7 +10,8 @@ install(DIRECTORY config models DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel COM
 foreach(page
   clients/cam/README.md clients/library/README.md clients/python/README.md deploy/patroni/README.md deploy/security/README.md
   idl/README.md idl/repairs/README.md idl/repairs/guard/README.md server/bias/flange/README.md
-  server/calibrate/causes/README.md server/calibrate/instruments/README.md server/calibrate/maps/README.md
+  server/calibrate/causes/README.md server/calibrate/gauges/README.md server/calibrate/instruments/README.md
+  server/calibrate/maps/README.md server/gateway/README.md
   server/compensate/MODEL_FILE.md server/compensate/budget/README.md server/dds/records/README.md server/diagnose/README.md
   server/diagnose/TOUR.md server/error_sources/README.md server/health/README.md server/http/README.md
   server/measurement/files/README.md server/report/README.md server/robot/README.md server/store/README.md

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/base/neighbours.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -41,6 +42,18 @@ TEST_F(Doctor, SaysOfAMachineWithoutAServerHowToStartOne) {
   EXPECT_NE(check(finished, "port 17891").at("next").get<std::string>().find("trammeld"),
             std::string::npos);
   EXPECT_EQ(check(finished, "leftovers").at("state"), "good");
+}
+
+TEST_F(Doctor, WarnsOfOthersOnThisHostUnlessCertificatesAreUsed) {
+  const Neighbours here = neighbours();
+  const bool others = !here.may_log_in.empty();
+  const json open = check(examine({"--port", "17891"}), "neighbours");
+  EXPECT_EQ(open.at("state"), others ? "note" : "good") << open;
+  for (const std::string& name : here.logged_in.empty() ? here.may_log_in : here.logged_in)
+    EXPECT_NE(open.at("what").get<std::string>().find(name), std::string::npos) << open;
+  const json guarded =
+      check(examine({"--port", "17891", "--security", folder_.path()}), "neighbours");
+  EXPECT_EQ(guarded.at("state"), "good") << guarded;
 }
 
 TEST_F(Doctor, FindsAPortThatAnotherProgramHasAStoreWithoutAFolderAndLeftovers) {

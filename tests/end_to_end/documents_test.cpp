@@ -79,6 +79,7 @@ const std::map<std::string, std::string>& not_typed() {
       {"deploy/check fuzz", "takes minutes; Fuzz.*"},
       {"export P", "belongs to the lines below it"},
       {"python3 /usr/share/doc/python3-trammel/tour.py", "Python.*, deploy/try-packages"},
+      {"deploy/http/correct", "needs a service with `api: true`; GatewayTest.TheExamples..."},
       {"trammel status --host line-3.works", "needs another host; Security.*"},
       {"trammel doctor --host line-3.works", "needs another host; Security.*"},
       {"trammeld --config server.yaml --check", "needs another host's address; Security.*"},

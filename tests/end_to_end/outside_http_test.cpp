@@ -20,11 +20,10 @@ class OutsideHttp : public testing::Test {
   /// file.
   void start(const std::string& dds = "") {
     const std::string key = folder_.file("key.pem"), certificate = folder_.file("cert.pem");
-    const test::Finished made =
-        test::run({"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
-                   "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", key, "-out", certificate,
-                   "-days", "2", "-subj", "/CN=localhost", "-addext",
-                   "subjectAltName=DNS:localhost,IP:127.0.0.1"});
+    const test::Finished made = test::run(
+        {"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+         "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", key, "-out", certificate, "-days",
+         "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"});
     ASSERT_EQ(made.exit_code, 0) << made.err;
     std::ofstream tokens(folder_.file("tokens"));
     nlohmann::json by_role;
@@ -89,7 +88,7 @@ TEST_F(OutsideHttp, OneClientThatAsksForMuchKeepsNobodyWaiting) {
 }
 
 TEST_F(OutsideHttp, AFullQueueIsToldAndNothingIsLost) {
-  start("dds: {queued_requests: 1}\n");
+  start("dds: {queued_requests: 2}\n");
   expect_good("full");
 }
 

@@ -19,6 +19,7 @@
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/neighbours.h"
 #include "server/base/part_file.h"
 #include "server/base/plain_text.h"
 #include "server/store/commit_safety.h"
@@ -171,6 +172,25 @@ Found certificates(const std::string& folder, const std::vector<HostPort>& place
   return {"certificates", State::kGood, "of " + shown(*subject), ""};
 }
 
+/// Whoever is on this host reaches what listens on 127.0.0.1.
+Found others_on_host(const std::string& folder, const std::vector<HostPort>& places) {
+  const bool any_here = std::any_of(places.begin(), places.end(), is_of_this_host);
+  const Neighbours found = neighbours();
+  if (found.may_log_in.empty())
+    return {"neighbours", State::kGood, "nobody else may log in to this host", ""};
+  const std::string who =
+      found.logged_in.empty()
+          ? fmt::format("may log in: {}",
+                        shown(fmt::format("{}", fmt::join(found.may_log_in, ", "))))
+          : fmt::format("logged in: {}",
+                        shown(fmt::format("{}", fmt::join(found.logged_in, ", "))));
+  if (!any_here) return {"neighbours", State::kGood, who + "; the service is on another host", ""};
+  if (!folder.empty()) return {"neighbours", State::kGood, who + "; certificates are used", ""};
+  return {"neighbours", State::kNote,
+          who + ": without certificates and tokens they may ask a service here for everything",
+          "where they should not: deploy/security/README.md, \"Several people on one host\""};
+}
+
 Found clock() {
   const auto now = std::chrono::duration_cast<std::chrono::seconds>(
                        std::chrono::system_clock::now().time_since_epoch())
@@ -278,6 +298,7 @@ Result<Extent> examine(const DoctorArguments& arguments) {
   }
   found.push_back(leftovers(folders));
   found.push_back(certificates(service.security, places));
+  found.push_back(others_on_host(service.security, places));
   tell(as_text(found), {arguments.json});
   nlohmann::ordered_json checks = nlohmann::ordered_json::array();
   for (const Found& one : found)
