@@ -364,7 +364,7 @@ TEST_F(GatewayTest, APersonDropsAProgramAndGetsItBackWithItsReceipt) {
     });)");
   EXPECT_NE(said.dump().find("1 targets"), std::string::npos) << said;
   const json files = browser.run(
-      "return [...document.querySelectorAll('#result a')].map(link => link.textContent);");
+      "return [...document.querySelectorAll('#links a')].map(link => link.textContent);");
   EXPECT_EQ(files, json({"weld.mod", "receipt.csv", "receipt.json"}));
   const json returned = browser.run("return window.kept[0].text();");
   const HttpAnswer direct = send({.path = "/api/v1/cells/cell-7/program?name=weld.mod",
@@ -372,6 +372,26 @@ TEST_F(GatewayTest, APersonDropsAProgramAndGetsItBackWithItsReceipt) {
                                   .type = "application/octet-stream"});
   EXPECT_EQ(returned, json(direct.body)) << "as curl gets it";
   EXPECT_EQ(browser.complaints(), std::vector<std::string>());
+  for (const int width : {400, 1200}) {
+    browser.resize(width, 900);
+    EXPECT_EQ(browser.run("const root = document.documentElement;"
+                          "return root.scrollWidth - root.clientWidth;"),
+              json(0))
+        << width << " px";
+  }
+  browser.run("document.getElementById('cell').value = 'cell-9';");
+  const json wrong = browser.run(R"(
+    const dropped = new DataTransfer();
+    dropped.items.add(new File(['no program'], 'weld.mod'));
+    document.getElementById('drop').dispatchEvent(new DragEvent('drop', {dataTransfer: dropped}));
+    const state = document.getElementById('state');
+    return new Promise(done => {
+      const look = () => state.className ? done(state.textContent) : setTimeout(look, 20);
+      look();
+    });)");
+  EXPECT_NE(wrong.dump().find("cell-9"), std::string::npos) << wrong;
+  const auto complained = browser.complaints();  // the console tells of the 404, too
+  EXPECT_EQ(complained.size(), 1u);
 }
 
 }  // namespace
