@@ -1,5 +1,8 @@
 #include "server/gateway/json_reader.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -49,7 +52,7 @@ void JsonReader::only(std::initializer_list<const char*> names) {
   for (const auto& [name, value] : object_.items()) {
     const bool known = std::any_of(names.begin(), names.end(),
                                    [&](const char* one) { return std::string_view(one) == name; });
-    if (!known) refuse(name.c_str(), "no member of this name");
+    if (!known) refuse(name.c_str(), fmt::format("one of {}", fmt::join(names, ", ")));
   }
 }
 

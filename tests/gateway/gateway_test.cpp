@@ -10,6 +10,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,16 @@ const std::string kProgram =
     "MODULE weld ! \xe4 is no UTF-8\r\n"
     "  CONST jointtarget jA:=[[5,10,15,20,25,30],[9E9,9E9,9E9,9E9,9E9,9E9]];\r\n"
     "  PROC main()\r\n    MoveAbsJ jA,v100,fine,spindle;\r\n  ENDPROC\r\nENDMODULE\r\n";
+
+/// An address of the description, with a cell and a job in it.
+std::string filled_in(std::string path) {
+  for (const auto& [word, with] :
+       {std::pair<std::string, std::string>{"{cell}", "cell-7"}, {"{job}", "1"}}) {
+    const std::size_t at = path.find(word);
+    if (at != std::string::npos) path.replace(at, word.size(), with);
+  }
+  return "/api/v1" + path;
+}
 
 struct Sent {
   std::string method = "POST", path, body = {}, type = "application/json", headers = {};
@@ -171,12 +182,7 @@ TEST_F(GatewayTest, TheDescriptionAndTheAddressesAreTheSame) {
   for (const auto& [path, operations] : told["paths"].items()) {
     described.insert(path);
     const std::string other = operations.contains("get") ? "POST" : "GET";
-    std::string address = "/api/v1" + path;
-    for (const auto& [word, with] :
-         {std::pair<std::string, std::string>{"{cell}", "cell-7"}, {"{job}", "1"}}) {
-      const std::size_t at = address.find(word);
-      if (at != std::string::npos) address.replace(at, word.size(), with);
-    }
+    const std::string address = filled_in(path);
     EXPECT_EQ(send({.method = other, .path = address, .body = "{}"}).code, 405) << address;
   }
   EXPECT_EQ(described, known);
@@ -193,6 +199,96 @@ TEST_F(GatewayTest, TheDescriptionHasTheMembersOfTheAnswers) {
     EXPECT_TRUE(figures.contains(name)) << name;
   for (const auto& [name, value] : told.items())
     EXPECT_TRUE(schemas["Predictions"]["properties"].contains(name)) << name;
+}
+
+/// The members that a body may have, as the refusal of another one lists them.
+std::set<std::string> members_in(const std::string& refused) {
+  const std::string message = json::parse(refused)["error"]["message"], before = "expected one of ";
+  const std::size_t at = message.find(before);
+  std::set<std::string> members;
+  if (at == std::string::npos) return members;
+  std::istringstream list(message.substr(at + before.size()));
+  for (std::string name; std::getline(list >> std::ws, name, ',');) members.insert(name);
+  return members;
+}
+
+// A member that is described and refused, or taken and not described, would lead a programmer
+// astray.
+TEST_F(GatewayTest, TheDescriptionHasTheMembersAndOptionsOfTheQuestions) {
+  start();
+  const json told = get("/api/v1/openapi.json");
+  int bodies = 0, options = 0;
+  for (const auto& [path, operations] : told["paths"].items()) {
+    for (const auto& [method, operation] : operations.items()) {
+      std::string address = filled_in(path), separator = "?";
+      for (const json& parameter : operation["parameters"]) {
+        if (parameter["in"] != "query") continue;
+        address += separator + parameter["name"].get<std::string>() + "=1";
+        separator = "&";
+        ++options;
+      }
+      Sent sent{.method = method == "get" ? "GET" : "POST", .path = address, .body = "{}"};
+      if (operation.contains("requestBody"))
+        sent.type = operation["requestBody"]["content"].begin().key();
+      EXPECT_EQ(send(sent).body.find("is no option"), std::string::npos) << address;
+      sent.path += separator + "zz=1";
+      EXPECT_NE(send(sent).body.find("'zz' is no option"), std::string::npos) << address;
+      if (sent.type != "application/json" || sent.method == "GET") continue;
+      ++bodies;
+      const std::string named =
+          operation["requestBody"]["content"]["application/json"]["schema"]["$ref"];
+      const json schema = told.at(json::json_pointer(named.substr(1)));
+      std::set<std::string> described;
+      for (const auto& [name, member] : schema["properties"].items()) described.insert(name);
+      sent.path = address;
+      sent.body = R"({"zz": 1})";
+      EXPECT_EQ(members_in(send(sent).body), described) << address;
+    }
+  }
+  EXPECT_EQ(bodies, 6);
+  EXPECT_GE(options, 10);
+}
+
+/// All texts behind `$ref`.
+void find_references(const json& value, std::set<std::string>& found) {
+  if (value.is_object() && value.contains("$ref")) found.insert(value["$ref"].get<std::string>());
+  if (!value.is_structured()) return;
+  for (const json& one : value) find_references(one, found);
+}
+
+TEST_F(GatewayTest, EverySchemaThatTheDescriptionNamesIsInIt) {
+  start();
+  const json told = get("/api/v1/openapi.json");
+  std::set<std::string> references;
+  find_references(told, references);
+  EXPECT_GE(references.size(), 15u);
+  for (const std::string& reference : references)
+    EXPECT_TRUE(told.contains(json::json_pointer(reference.substr(1)))) << reference;
+  for (const auto& [name, schema] : told["components"]["schemas"].items())
+    EXPECT_TRUE(references.contains("#/components/schemas/" + name)) << name << " is of no use";
+}
+
+TEST_F(GatewayTest, WhoMayAskIsWhoTheDescriptionSays) {
+  const std::vector<std::string> roles = {"observer", "cam", "metrologist", "engineer"};
+  std::string lines;
+  for (const std::string& role : roles)
+    lines += "one-" + role + " " + role + " " + sha256_hex(role) + "\n";
+  start(tokens_file(lines));
+  const json told = json::parse(
+      send({"GET", "/api/v1/openapi.json", {}, {}, "Authorization: Bearer observer\r\n"}).body);
+  for (const auto& [path, operations] : told["paths"].items()) {
+    for (const auto& [method, operation] : operations.items()) {
+      Sent sent{.method = method == "get" ? "GET" : "POST", .path = filled_in(path), .body = "{}"};
+      bool may = false;
+      EXPECT_EQ(send(sent).code, 401) << path;
+      for (const std::string& role : roles) {
+        may = may || operation["x-role"] == role;
+        sent.headers = "Authorization: Bearer " + role + "\r\n";
+        EXPECT_EQ(send(sent).code != 403, may) << path << " as " << role;
+      }
+      EXPECT_TRUE(may) << path << " has no role";
+    }
+  }
 }
 
 struct Mistake {
