@@ -323,6 +323,17 @@ TEST(Turns, TheRequestsOfOneCellTakeNoMoreThanTheirShareOfTheRoom) {
   EXPECT_TRUE(ask(shop, "client 11", {1, milliseconds(1), milliseconds(1000000), "cell-8"}));
 }
 
+// Half of one place is none: the first request was answered, and no other ever.
+TEST(Turns, ACellHasOnePlaceHoweverSmallItsShare) {
+  TurnLimits limits;
+  limits.requests = 1;
+  Shop shop(limits);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(ask(shop, "a", {}));
+    work_all(shop);
+  }
+}
+
 TEST(Turns, TheMemoryOfWaitingRequestsIsBoundedForAClientACellAndAll) {
   Shop shop({}, {20000, 5000, 0.5});
   const auto fill = [&](const std::string& client, const std::string& cell) {

@@ -88,7 +88,7 @@ HttpLimits echoing_limits() {
   limits.posts = HttpPosts();
   limits.posts->word = "api";
   limits.posts->workers = 1;
-  limits.posts->body = 64;
+  limits.posts->body = 256;
   return limits;
 }
 
@@ -128,12 +128,17 @@ TEST_F(BoundedServerTest, AConnectionHasManyRequestsAndOccupiesNoWorkerBetweenTh
 TEST_F(BoundedServerTest, TheUnreadBodyOfARefusedRequestIsNoRequest) {
   start(echoing_limits(), echo_body);
   const std::string hidden = post_of("hidden");
-  const std::string long_one = hidden + std::string(200, ' ');
+  const std::string long_one = hidden + std::string(300, ' ');
   for (const std::string& sent : {post_of(hidden, "text/plain"), post_of(long_one)}) {
     const std::string answers = http_exchange(kPort, sent);
     EXPECT_EQ(answers.find("hidden"), std::string::npos) << answers;
     EXPECT_NE(answers.find("Connection: close"), std::string::npos) << answers;
   }
+  const OpenConnection slow(kPort);  // its body would come behind the answer
+  const std::string sent = post_of(hidden, "text/plain");
+  slow.send(sent.substr(0, sent.find("\r\n\r\n") + 4));
+  EXPECT_EQ(parse_http(slow.read(seconds(5))).code, 415);
+  EXPECT_TRUE(slow.closes_within(milliseconds(1)));
   const std::string twice =
       "POST /api/a HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
       "Content-Length: 3\r\nContent-Length: 300\r\n\r\nabc";
