@@ -1,7 +1,7 @@
 // The cost of the service beside a raw Fast DDS echo of the same payload with the same threads,
-// interleaved in one run: only the ratios count. `service_benchmark [--quick] [overhead] [load]
-// [training] [flood]`; none named: all but training. Models are trained once and kept in the build
-// folder.
+// interleaved in one run: only the ratios count. `service_benchmark [--quick] [overhead] [http]
+// [load] [training] [flood]`; none named: all but training. Models are trained once and kept in the
+// build folder.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -20,6 +20,7 @@
 #include "tests/support/daemon.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
+#include "tests/support/http_client.h"
 #include "tests/support/virtual_cell.h"
 #include "tests/support/virtual_robot.h"
 
@@ -137,6 +138,10 @@ CompensatedModel model_of(const ModelSpec& spec, int poses) {
 class Bench {
  public:
   explicit Bench(const CompensatedModel& model) {
+    const Status written = write_text_file(
+        daemon_.config_path(), fmt::format("{}http: {{port: {}, api: true}}\n",
+                                           test::read_file(daemon_.config_path()), http_port()));
+    if (!written) std::abort();
     {
       auto store = test::demand(Store::open(daemon_.store_path()));
       static_cast<void>(test::demand(store->add_model("cell-7", model, 0, true, "benchmark")));
@@ -149,6 +154,9 @@ class Bench {
   }
   [[nodiscard]] std::uint16_t echo_port() const {
     return static_cast<std::uint16_t>(daemon_.port() + 2);
+  }
+  [[nodiscard]] std::uint16_t http_port() const {
+    return static_cast<std::uint16_t>(daemon_.port() + 4);
   }
   [[nodiscard]] test::Daemon& daemon() { return daemon_; }
 
@@ -251,6 +259,39 @@ void overhead(bool quick) {
            interleaved<wire::PredictError>(bench, predictions_of(joints), items, predict, rounds));
     }
   }
+}
+
+/// One prediction after the other on one connection, beside the same on DDS.
+void over_http(bool quick) {
+  Bench bench(model_of(kModels[1], quick ? 300 : 1200));
+  const auto on_dds = bench.asker<wire::PredictError>(false, "dds");
+  const auto joints = test::virtual_joints(1, 5);
+  auto request = predictions_of(joints);
+  std::string list;
+  for (const double q : joints[0]) list += fmt::format("{}{}", list.empty() ? "" : ",", to_deg(q));
+  const std::string body = fmt::format(R"({{"poses":[{{"joints_deg":[{}]}}]}})", list);
+  const std::string text = fmt::format(
+      "POST /api/v1/cells/cell-7/predict HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+      "Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{}",
+      body.size(), body);
+  const test::OpenConnection connection(bench.http_port());
+  std::vector<double> dds, http;
+  for (int i = -50; i < (quick ? 1000 : 5000); ++i) {
+    const auto answered = on_dds->ask(request);
+    const auto begun = Clock::now();
+    connection.send(text);
+    const std::string answer = connection.read_answer(std::chrono::seconds(10));
+    const double took = Millis(Clock::now() - begun).count();
+    if (!answered || !answer.starts_with("HTTP/1.1 200")) std::abort();
+    if (i < 0) continue;  // warms up
+    dds.push_back(answered->count());
+    http.push_back(took);
+  }
+  std::printf("PredictError of 1, se: on DDS %.3f / %.3f ms (p50 / p99), over HTTP %.3f / %.3f\n",
+              percentile(dds, 0.5), percentile(dds, 0.99), percentile(http, 0.5),
+              percentile(http, 0.99));
+  test::tell_figure("PredictError of 1, se, over HTTP beside DDS, p50",
+                    percentile(http, 0.5) / percentile(dds, 0.5));
 }
 
 // ---- many clients
@@ -400,10 +441,12 @@ int run(const std::vector<std::string>& words) {
     else
       parts.push_back(word);
   }
-  if (parts.empty()) parts = {"overhead", "load", "flood"};
+  if (parts.empty()) parts = {"overhead", "http", "load", "flood"};
   for (const std::string& part : parts) {
     if (part == "overhead") {
       overhead(quick);
+    } else if (part == "http") {
+      over_http(quick);
     } else if (part == "load" || part == "training") {
       eight_clients(quick, part == "training");
     } else if (part == "flood") {

@@ -99,15 +99,6 @@ std::string post_of(const std::string& body, const std::string& type = "applicat
          "\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
 }
 
-/// The answer whose end is known by `body`, on a connection that stays open.
-std::string read_until(const OpenConnection& connection, const std::string& body) {
-  std::string bytes;
-  const auto until = std::chrono::steady_clock::now() + seconds(10);
-  while (!bytes.ends_with(body) && std::chrono::steady_clock::now() < until)
-    bytes += connection.read(milliseconds(5));
-  return bytes;
-}
-
 // One worker would be held up by one idle client if that client kept it.
 TEST_F(BoundedServerTest, AConnectionHasManyRequestsAndOccupiesNoWorkerBetweenThem) {
   start(echoing_limits(), echo_body);
@@ -115,7 +106,7 @@ TEST_F(BoundedServerTest, AConnectionHasManyRequestsAndOccupiesNoWorkerBetweenTh
   for (const char* body : {"one", "two", "three"}) {
     for (const OpenConnection* connection : {&first, &second}) {
       connection->send(post_of(body));
-      const std::string answer = read_until(*connection, body);
+      const std::string answer = connection->read_answer(seconds(10));
       EXPECT_EQ(parse_http(answer).body, body);
       EXPECT_EQ(answer.find("Connection: close"), std::string::npos) << answer;
     }
@@ -152,13 +143,13 @@ TEST_F(BoundedServerTest, AnIdleConnectionMakesRoomForANewOne) {
   const OpenConnection idle(kPort), other(kPort);
   for (const OpenConnection* connection : {&idle, &other}) {
     connection->send(post_of("x"));
-    EXPECT_EQ(parse_http(read_until(*connection, "x")).code, 200);
+    EXPECT_EQ(parse_http(connection->read_answer(seconds(10))).code, 200);
   }
   const OpenConnection late(kPort);
   EXPECT_TRUE(idle.closes_within(seconds(5)));
   EXPECT_EQ(server_->shed(), 0u);
   late.send(post_of("y"));
-  EXPECT_EQ(parse_http(read_until(late, "y")).body, "y");
+  EXPECT_EQ(parse_http(late.read_answer(seconds(10))).body, "y");
 }
 
 TEST_F(BoundedServerTest, AnswersToNamesOfThisHostOnly) {

@@ -31,6 +31,19 @@ void OpenConnection::send(const std::string& bytes) const {
 }
 
 std::string OpenConnection::read(std::chrono::milliseconds limit) const {
+  return read_until(limit, [](const std::string&) { return false; });
+}
+
+std::string OpenConnection::read_answer(std::chrono::milliseconds limit) const {
+  return read_until(limit, [](const std::string& bytes) {
+    const std::size_t end = bytes.find("\r\n\r\n"), at = bytes.find("\r\nContent-Length:");
+    if (end == std::string::npos || at == std::string::npos || at > end) return false;
+    return bytes.size() >= end + 4 + std::stoul(bytes.substr(at + 17, 20));
+  });
+}
+
+std::string OpenConnection::read_until(std::chrono::milliseconds limit,
+                                       bool (*is_whole)(const std::string&)) const {
   const auto until = Clock::now() + limit;
   std::string bytes;
   std::array<char, 65536> part{};
@@ -41,6 +54,7 @@ std::string OpenConnection::read(std::chrono::milliseconds limit) const {
     const ssize_t got = ::recv(socket_, part.data(), part.size(), 0);
     if (got <= 0) return bytes;
     bytes.append(part.data(), static_cast<std::size_t>(got));
+    if (is_whole(bytes)) return bytes;
   }
 }
 

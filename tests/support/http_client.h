@@ -31,10 +31,16 @@ class OpenConnection {
   void send(const std::string& bytes) const;
   /// Until the other side closes or the limit is over.
   [[nodiscard]] std::string read(std::chrono::milliseconds limit) const;
+  /// The answer, complete by its length: the connection may stay open.
+  [[nodiscard]] std::string read_answer(std::chrono::milliseconds limit) const;
   /// True if the other side closes within the limit.
   [[nodiscard]] bool closes_within(std::chrono::milliseconds limit) const;
 
  private:
+  /// Until `is_whole`, the other side closes or the limit is over.
+  [[nodiscard]] std::string read_until(std::chrono::milliseconds limit,
+                                       bool (*is_whole)(const std::string& bytes)) const;
+
   int socket_;
 };
 

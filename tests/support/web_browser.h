@@ -79,12 +79,6 @@ class WebBrowser {
  private:
   static constexpr std::chrono::seconds kLimit{30};
 
-  /// True if the answer is complete by its length, since the driver keeps connections open.
-  static bool is_whole(const std::string& bytes) {
-    const std::size_t end = bytes.find("\r\n\r\n"), at = bytes.find("\r\nContent-Length:");
-    if (end == std::string::npos || at == std::string::npos || at > end) return false;
-    return bytes.size() >= end + 4 + std::stoul(bytes.substr(at + 17, 20));
-  }
   nlohmann::json ask(const std::string& method, const std::string& path,
                      const nlohmann::json& body) {
     if (is_gone_) return {};
@@ -94,11 +88,7 @@ class WebBrowser {
         fmt::format("{} {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nContent-Type: application/json\r\n"
                     "Content-Length: {}\r\n\r\n{}",
                     method, path, port_, text.size(), text));
-    std::string bytes;
-    const auto until = std::chrono::steady_clock::now() + kLimit;
-    while (!is_whole(bytes) && std::chrono::steady_clock::now() < until)
-      bytes += connection.read(std::chrono::milliseconds(4));
-    const HttpAnswer answer = parse_http(bytes);
+    const HttpAnswer answer = parse_http(connection.read_answer(kLimit));
     is_gone_ = answer.code == 0;
     const nlohmann::json json = nlohmann::json::parse(answer.body, nullptr, false);
     EXPECT_EQ(answer.code, 200) << method << " " << path << "\n" << answer.body.substr(0, 400);
