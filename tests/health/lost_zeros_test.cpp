@@ -146,6 +146,27 @@ TEST(LostZerosOfSeveralJoints, HaveEachTheMillimetresThatACheckOfThatOneAloneTel
   }
 }
 
+TEST(LostZerosOfSeveralJoints, AreNamedWhereTheToolLiesOnTheLastAxis) {
+  const Vector3 on_axis(5e-5, 0, 0.18);
+  CompensatedModel::Parts parts = test::trained(test::irb120(), on_axis).parts();
+  // An arm that its model does not describe wholly, with some larger errors
+  parts.discrepancy = 10e-6;  // m
+  for (Evaluation* shown : {&parts.training, &*parts.validation})
+    shown->compensated.p997 = 3 * shown->compensated.rms;
+  const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    PlainCheck check{spread_poses(12, seed), JointVector::Zero(6)};
+    check.tool = on_axis;
+    check.seed = seed;
+    const HealthCheck healthy = test::demand(checked(model, measured(test::irb120(), check)));
+    EXPECT_EQ(healthy.verdict, HealthVerdict::kHealthy) << healthy.sentence;
+    check.zeros << 0, 1.3e-3, -1.9e-3, 1.8e-3, 1.7e-3, 0;
+    const HealthCheck lost = test::demand(checked(model, measured(test::irb120(), check)));
+    ASSERT_EQ(lost.changed.size(), 1u) << lost.sentence;
+    EXPECT_EQ(lost.changed.front().zeros.size(), 4u) << lost.sentence;
+  }
+}
+
 TEST(LostZeroOfTheLastJoint, StandsNotBesideAToolThatOrientationsShowNotToHaveTurned) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     PlainCheck knocked{spread_poses(14, seed), JointVector::Zero(6), true};

@@ -105,20 +105,22 @@ MeasurementBatch measured(const PlainArm& arm, const PlainCheck& check) {
   return batch;
 }
 
-CompensatedModel trained(const PlainArm& arm) {
+CompensatedModel trained(const PlainArm& arm, const Vector3& tool) {
   constexpr int kPoses = 100;
-  const std::string text =
-      "version: 1\ncell: plain\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, "
-      "0]}\n"
-      "tools: {tip: {xyz_mm: [40, -25, 140], q_wxyz: [1, 0, 0, 0]}}\n"
-      "tracker: {sigma_mm: 0.013, sigma_deg: 0.003}\nmodel: {error_sources: [base, geometry], "
-      "bias: none}\n";
+  const std::string text = fmt::format(
+      "version: 1\ncell: plain\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, "
+      "0]}}\n"
+      "tools: {{tip: {{xyz_mm: [{}, {}, {}], q_wxyz: [1, 0, 0, 0]}}}}\n"
+      "tracker: {{sigma_mm: 0.013, sigma_deg: 0.003}}\nmodel: {{error_sources: [base, geometry], "
+      "bias: none}}\n",
+      to_mm(tool.x()), to_mm(tool.y()), to_mm(tool.z()));
   const auto cell = std::make_shared<const Cell>(demand(parse_cell(
       text, demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/" + arm.file)), "cell.yaml")));
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> angle(-1.1, 1.1);
   const auto joints = static_cast<Index>(arm.links.size());
   PlainCheck poses{{}, JointVector::Zero(joints)};
+  poses.tool = tool;
   for (int k = 0; k < kPoses; ++k)
     poses.poses.push_back(JointVector::NullaryExpr(joints, [&] { return angle(random); }));
   TrainOptions options;

@@ -38,8 +38,8 @@ struct PlainCheck {
 };
 [[nodiscard]] MeasurementBatch measured(const PlainArm& arm, const PlainCheck& check);
 
-/// On 100 poses, base and geometry identified.
-[[nodiscard]] CompensatedModel trained(const PlainArm& arm);
+/// On 100 poses, base and geometry identified. `tool` is the point in the flange, m.
+[[nodiscard]] CompensatedModel trained(const PlainArm& arm, const Vector3& tool = plain_tool());
 
 /// Elbow postures for one flange pose of a seven-axis arm: the third joint turns from -60 to 60
 /// degrees. `like`: a posture with that flange pose.

@@ -232,7 +232,9 @@ Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviat
 
 /// The covariance of the model error if it acts as an error of each joint's angle by an arbitrary
 /// function, equal for all joints and of the total size of the model error: R x R. Unknown gear
-/// errors look like that, and differ between axes.
+/// errors look like that, and differ between axes. Where orientations are measured, no joint's
+/// error turns the tool by more than the orientations leave: a joint whose axis the tool lies on
+/// moves no position, however large its error is.
 Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& deviations,
                                const CauseEffects& effects, const JointVector& range) {
   const Index R = rows.residual.size();
@@ -244,11 +246,21 @@ Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& devia
     for (const Index first : rows.first) sum += of.segment<3>(first).squaredNorm();
     return sum;
   };
+  const auto power_of_turns = [&](const Eigen::VectorXd& of) {
+    double sum = 0;
+    for (std::size_t i = 0; i < rows.poses(); ++i)
+      sum += of.segment(rows.first[i] + 3, rows.count[i] - 3).squaredNorm();
+    return sum;
+  };
+  const Eigen::VectorXd most = deviations.left.cwiseMax(deviations.noise);
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(R, R);
   for (const auto& [joint, column] : columns) {
     Eigen::VectorXd moved = rows.by_cause.col(column);
     if (!(power(moved) > 0)) continue;
-    moved *= std::sqrt(power(deviations.left) / power(moved) / static_cast<double>(columns.size()));
+    double share = power(deviations.left) / power(moved);
+    if (const double turned = power_of_turns(moved); turned > 0)
+      share = std::min(share, power_of_turns(most) / turned);
+    moved *= std::sqrt(share / static_cast<double>(columns.size()));
     for (std::size_t i = 0; i < rows.poses(); ++i) {
       for (std::size_t k = 0; k < rows.poses(); ++k) {
         const double apart = (rows.contexts[i].q(joint) - rows.contexts[k].q(joint)) /
