@@ -208,13 +208,14 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell,
   return result;
 }
 
-/// If no arm fits all rows together, removes the rows that fit no arm on which the others agree, as
-/// a training does, and lists them as suspects. Returns true if there are any.
-bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, const Error& refusal,
-               PreparedBatch& prepared, Diagnosis& diagnosis) {
+/// Removes the rows that fit no arm on which the others agree, as a training does, and lists them
+/// as suspects. Returns true if there are any. `plain`: the calibration on all rows, or why there
+/// is none.
+bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed,
+               const Result<CalibrationResult>& plain, PreparedBatch& prepared,
+               Diagnosis& diagnosis) {
   const std::vector<std::string> sources = sources_of(*cell, placed);
-  std::optional<Agreement> agreement = agreement_of(
-      cell, sources, prepared.train, Result<CalibrationResult>(tl::make_unexpected(refusal)));
+  std::optional<Agreement> agreement = agreement_of(cell, sources, prepared.train, plain);
   if (!agreement) return false;
   Result<CalibrationResult> found = calibrate(cell, sources, agreement->agreeing, {});
   if (!found) return false;
@@ -321,18 +322,11 @@ struct Answered {
   Diagnosis diagnosis;  ///< up to findings and verdict
 };
 
-Result<Answered> answered(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                          const DiagnoseOptions& options) {
-  Answered all;
+/// The answer of a search that ended.
+void tell_answer(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                 const DiagnoseOptions& options, SearchResult found, Answered& all) {
   Diagnosis& diagnosis = all.diagnosis;
-  all.together = TRY(placed(cell, batch, options));
-  all.prepared = TRY(prepare(*cell, batch, all.together.sessions()));
-  Result<SearchResult> result = searched(cell, all.prepared, all.together, options, diagnosis);
-  if (!result && result.error().code == ErrorCode::kRefused &&
-      set_aside(cell, all.together, result.error(), all.prepared, diagnosis))
-    result = searched(cell, all.prepared, all.together, options, diagnosis);
-  if (!result) return tl::make_unexpected(result.error());
-  all.explained = std::make_unique<const Explained>(*cell, std::move(*result));
+  all.explained = std::make_unique<const Explained>(*cell, std::move(found));
   const Explained& explained = *all.explained;
   const PreparedBatch& prepared = all.prepared;
 
@@ -349,7 +343,43 @@ Result<Answered> answered(const std::shared_ptr<const Cell>& cell, const Checked
   tell_row_mistakes(explained, prepared.sorted ? batch.rows() : MeasurementBatch(), diagnosis);
   tell_sources(explained.found, prepared.sorted, diagnosis);
   tell_largest_first(diagnosis);
-  return all;
+}
+
+/// True if bad rows may hide what the search did not name. A change in the middle of the batch
+/// leaves two arms, and neither of them is bad.
+bool may_hide(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+              const Answered& all) {
+  return (all.explained->found.too_many_outliers || all.diagnosis.verdict == Verdict::kUnknown) &&
+         !jump_within(cell, batch.in_order_of_time(cell->robot).rows());
+}
+
+Result<Answered> answered(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                          const DiagnoseOptions& options) {
+  Answered all;
+  all.together = TRY(placed(cell, batch, options));
+  all.prepared = TRY(prepare(*cell, batch, all.together.sessions()));
+  Result<SearchResult> result = searched(cell, all.prepared, all.together, options, all.diagnosis);
+  std::optional<Result<CalibrationResult>> plain;
+  if (result) {
+    tell_answer(cell, batch, options, std::move(*result), all);
+    if (!may_hide(cell, batch, all)) return all;
+    plain = calibrate(cell, sources_of(*cell, all.together), all.prepared.train, {});
+  } else if (result.error().code == ErrorCode::kRefused) {
+    plain = Result<CalibrationResult>(tl::make_unexpected(result.error()));
+  }
+  Answered anew{all.together, all.prepared, nullptr, {}};
+  if (!plain || !set_aside(cell, anew.together, *plain, anew.prepared, anew.diagnosis)) {
+    if (!result) return tl::make_unexpected(result.error());
+    return all;
+  }
+  Result<SearchResult> among_others =
+      searched(cell, anew.prepared, anew.together, options, anew.diagnosis);
+  if (!among_others) {
+    if (!result) return tl::make_unexpected(among_others.error());
+    return all;
+  }
+  tell_answer(cell, batch, options, std::move(*among_others), anew);
+  return anew;
 }
 
 /// The sizes from which effects are named, proved in the batch's own residuals or in simulated
