@@ -9,6 +9,7 @@
 
 #include "server/base/units.h"
 #include "server/compensate/bias_physics.h"
+#include "server/robot/robot_confirmation.h"
 
 namespace trammel {
 
@@ -104,6 +105,12 @@ std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspect
                   count == 1 ? "row" : "rows", rows_of(suspects), count == 1 ? "it" : "them")};
 }
 
+bool identifies_geometry(const PhysicalModel& model) {
+  return std::any_of(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
+    return source->cause().part == causes::Part::kLinks;
+  });
+}
+
 std::optional<Note> robot_off_drawing(const PhysicalModel& model,
                                       const std::vector<IdentifiedParameter>& parameters,
                                       double discrepancy) {
@@ -139,30 +146,77 @@ std::optional<Note> robot_off_drawing(const PhysicalModel& model,
           off.numbers, lacking)};
 }
 
+namespace {
+
+/// Where the base was found, seen from where the cell file has it.
+struct BaseShift {
+  double away = 0, along = 0;    ///< m: in all; along the axis of joint 1
+  double turned = 0, about = 0;  ///< rad: in all; about the axis of joint 1
+
+  BaseShift(const Pose& said, const Pose& found) {
+    const Pose shift = said.inverse() * found;
+    const Eigen::AngleAxisd turn(Eigen::Quaterniond(shift.linear()).normalized());
+    away = shift.translation().norm();
+    along = shift.translation().z();
+    turned = turn.angle();
+    about = turn.angle() * turn.axis().z();
+  }
+  /// True within what a base that was measured may be off.
+  [[nodiscard]] bool is_set() const { return away < kSet && turned < kSetTurn; }
+  [[nodiscard]] bool is_far() const { return away >= kFar || turned >= kFarTurn; }
+  /// True if the first length of the robot file, or the zero of joint 1, explains the shift alone
+  /// and is farther off than a robot may be. A base that stands elsewhere is also moved sideways.
+  [[nodiscard]] bool may_be_the_arm() const {
+    const bool aside = std::sqrt(std::max(0.0, away * away - along * along)) >= kSet;
+    const bool tilted = std::sqrt(std::max(0.0, turned * turned - about * about)) >= kSetTurn;
+    return !aside && !tilted && (std::abs(along) > kSet || std::abs(about) > kZero);
+  }
+
+  static constexpr double kSet = 3e-3, kFar = 50e-3;  // m
+  static constexpr double kSetTurn = from_deg(0.5), kFarTurn = from_deg(5);
+  static constexpr double kZero = from_deg(1);
+};
+
+/// What the shift of the base may be, and what to do.
+std::string shift_explained(const BaseShift& shift, bool stops) {
+  if (stops)
+    return fmt::format(
+        ". It may be the robot file as well, by {}, and the measurements do not tell which: then "
+        "corrected poses land off by as much. Compare the file with the controller (trammel "
+        "confirm-robot). Where the file is right, write",
+        std::abs(shift.along) > BaseShift::kSet
+            ? fmt::format("{:.1f} mm in its first length (d1 or d_mm of the base)",
+                          to_mm(std::abs(shift.along)))
+            : fmt::format("{:.2f} deg in the zero of joint 1", to_deg(std::abs(shift.about))));
+  if (shift.is_far())
+    return ". Was the instrument set up elsewhere, or is `base` of the cell file wrong? Write";
+  return "; if it was measured and not drawn, the first length of the robot file is off by that; "
+         "else write";
+}
+
+}  // namespace
+
 std::optional<Note> base_elsewhere(const PhysicalModel& model) {
-  constexpr double kSet = 3e-3, kFar = 50e-3;  // m
-  constexpr double kSetTurn = from_deg(0.5), kFarTurn = from_deg(5);
   const std::optional<Pose>& said = model.cell->X_WB;
   if (!said) return std::nullopt;
   const Pose found = served_base(model);
+  const BaseShift shift(*said, found);
+  if (shift.is_set()) return std::nullopt;
+  const bool stops =
+      shift.may_be_the_arm() && identifies_geometry(model) && !confirmation_of(*model.cell);
   const Eigen::Quaterniond q(found.linear());
   const Vector3 p = found.translation();
-  const double away = (p - said->translation()).norm();
-  const double turned = q.angularDistance(Eigen::Quaterniond(said->linear()));
-  if (away < kSet && turned < kSetTurn) return std::nullopt;
-  const bool far = away >= kFar || turned >= kFarTurn;
   return Note{
-      "base_elsewhere", far ? Severity::kWarning : Severity::kInfo,
-      fmt::format(
-          "the robot's base stands {:.{}f} mm from where the cell file has it, turned by "
-          "{:.1f} deg, by the measurements, which the model follows{} base: {{xyz_mm: "
-          "[{:.1f}, {:.1f}, {:.1f}], q_wxyz: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]}}, or null",
-          to_mm(away), far ? 0 : 1, to_deg(turned),
-          far ? ". Was the instrument set up elsewhere, or is `base` of the cell file wrong? "
-                "Write"
-              : "; if it was measured and not drawn, the first length of the robot file is "
-                "off by that; else write",
-          to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), q.w(), q.x(), q.y(), q.z())};
+      kBaseElsewhere,
+      stops            ? Severity::kStop
+      : shift.is_far() ? Severity::kWarning
+                       : Severity::kInfo,
+      fmt::format("the robot's base stands {:.{}f} mm from where the cell file has it, turned by "
+                  "{:.1f} deg, by the measurements, which the model follows{} base: {{xyz_mm: "
+                  "[{:.1f}, {:.1f}, {:.1f}], q_wxyz: [{:.5f}, {:.5f}, {:.5f}, {:.5f}]}}, or null",
+                  to_mm(shift.away), shift.is_far() ? 0 : 1, to_deg(shift.turned),
+                  shift_explained(shift, stops), to_mm(p.x()), to_mm(p.y()), to_mm(p.z()), q.w(),
+                  q.x(), q.y(), q.z())};
 }
 
 Note measurements_rounded(const Rounding& rounding) {
@@ -216,12 +270,14 @@ Lengths identified_lengths(const PhysicalModel& model,
 std::optional<Note> lengths_scaled(const PhysicalModel& model,
                                    const std::vector<IdentifiedParameter>& parameters,
                                    const Eigen::MatrixXd& covariance) {
-  constexpr double kOfMaking = 20e-6;  // m: no length is known better
-  constexpr Eigen::Index kFewest = 3;  // lengths: two agree by chance
-  constexpr double kLeast = 200e-6;    // of a length: an arm that is 17 K warmer than drawn
-  constexpr double kSure = 5;          // standard deviations
-  constexpr double kLeftOver = 0.02;   // of the squares: the largest part that may remain after one
-                                       // common share
+  constexpr double kOfMaking = 20e-6;        // m: no length is known better
+  constexpr Eigen::Index kFewest = 3;        // lengths: two agree by chance
+  constexpr double kLeast = 200e-6;          // of a length: an arm that is 17 K warmer than drawn
+  constexpr double kGrowth = 12e-6;          // of steel and cast iron, 1/K
+  constexpr double kWarmest = 50 * kGrowth;  // no arm in a hall is farther from its drawing
+  constexpr double kSure = 5;                // standard deviations
+  constexpr double kLeftOver = 0.02;  // of the squares: the largest part that may remain after one
+                                      // common share
   const Lengths lengths = identified_lengths(model, parameters);
   if (lengths.drawn.size() < kFewest ||
       covariance.rows() < static_cast<Eigen::Index>(parameters.size()))
@@ -238,16 +294,19 @@ std::optional<Note> lengths_scaled(const PhysicalModel& model,
   if (std::abs(share) < kLeast || std::abs(share) * std::sqrt(precision) < kSure ||
       after > kLeftOver * before)
     return std::nullopt;
+  const bool warmth = std::abs(share) <= kWarmest;
   return Note{
-      "lengths_scaled", Severity::kWarning,
+      "lengths_scaled", warmth ? Severity::kWarning : Severity::kStop,
       fmt::format(
           "all {} lengths of the arm come out about {:.2f} % {} than drawn: one cause is likelier "
           "than as many errors of making. Is it the instrument's scale (hold it against a "
-          "known length, give it the air's temperature), or an arm that is {:.0f} K {} than "
-          "its drawing? These positions do not tell; where it is the instrument, corrected "
-          "targets land off by that share of their distance",
+          "known length, give it the air's temperature), or {}? These positions do not tell; "
+          "where it is {}, corrected targets land off by that share of their distance",
           lengths.drawn.size(), 100 * std::abs(share), share > 0 ? "longer" : "shorter",
-          std::abs(share) / 12e-6, share > 0 ? "warmer" : "colder")};
+          warmth ? fmt::format("an arm that is {:.0f} K {} than its drawing",
+                               std::abs(share) / kGrowth, share > 0 ? "warmer" : "colder")
+                 : "the file of another robot (no warmth makes as much)",
+          warmth ? "the instrument" : "either")};
 }
 
 }  // namespace trammel

@@ -274,6 +274,16 @@ void add_base_elsewhere(const CompensatedModel::Parts& parts, std::vector<Note>&
   if (auto note = base_elsewhere(parts.physics)) notes.push_back(*std::move(note));
 }
 
+/// The doubts of the robot file, by the geometry of the model or by what training asked beside it.
+void add_off_drawing(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  if (auto off = robot_off_drawing(parts.physics, parts.parameters, parts.discrepancy))
+    notes.push_back(*std::move(off));
+  if (auto scaled = lengths_scaled(parts.physics, parts.parameters, parts.covariance))
+    notes.push_back(*std::move(scaled));
+  if (parts.measured && parts.measured->off_drawing)
+    notes.push_back({kOffDrawing, Severity::kStop, *parts.measured->off_drawing});
+}
+
 void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   if (!parts.bias_origin) return;
@@ -368,6 +378,7 @@ void add_sides(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
 
 std::vector<Note> notes_of(const CompensatedModel& model) {
   std::vector<Note> notes;
+  add_off_drawing(model.parts(), notes);
   add_base_elsewhere(model.parts(), notes);
   if (model.parts().measured && model.parts().measured->rounding)
     notes.push_back(measurements_rounded(*model.parts().measured->rounding));
@@ -385,12 +396,6 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
     notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);
-  if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters,
-                                   model.parts().discrepancy))
-    notes.push_back(*std::move(off));
-  if (auto scaled =
-          lengths_scaled(model.parts().physics, model.parts().parameters, model.parts().covariance))
-    notes.push_back(*std::move(scaled));
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);
   add_confirmation(model.cell(), notes);

@@ -20,12 +20,14 @@ constexpr const char* kOneSide = "approached_from_one_side";
 ///
 /// `kStop`: a number of the robot file is farther off than a real robot is from its drawing (3 mm,
 /// 3 mrad, 1 degree of a zero), so the controller must have another file, and it would compute
-/// corrected poses with its own arm; or the residual is 30 times the stated sigma. `kWarning`: a
-/// base that stands elsewhere than in the cell file; measurements that were rounded; lengths of the
-/// arm that are all off by one share; a residual of 3 times the sigma, or with a bias of less than
-/// half of it; too few poses; poses approached from one side; doubts of the files (cell_doubts.h).
-/// `kInfo`: a robot file that was not confirmed, error sources without effect, a bias that was
-/// learned with a tool that has moved since, changes between sessions.
+/// corrected poses with its own arm; a base that stands elsewhere as a wrong first length would
+/// make it; lengths that are all off by a share beyond any warmth; or the residual is 30 times the
+/// stated sigma. `kWarning`: any other base that stands elsewhere than in the cell file;
+/// measurements that were rounded; lengths of the arm that are all off by one share; a residual of
+/// 3 times the sigma, or with a bias of less than half of it; too few poses; poses approached from
+/// one side; doubts of the files (cell_doubts.h). `kInfo`: a robot file that was not confirmed,
+/// error sources without effect, a bias that was learned with a tool that has moved since, changes
+/// between sessions.
 [[nodiscard]] std::vector<Note> notes_of(const CompensatedModel& model);
 
 /// The notes for a user of any result that rests on the cell's files and on no model yet.

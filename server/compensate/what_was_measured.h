@@ -43,6 +43,9 @@ struct WhatWasMeasured {
     double stddev = 0;  ///< m, of one axis
   };
   std::optional<JointRounding> joint_rounding;
+  /// The doubt of the robot file by the same rows, in words, if the model identifies no geometry
+  /// that would show it. A bias learns a wrong length as it learns everything else.
+  std::optional<std::string> off_drawing;
   static constexpr int kDirections = 16;
 
   /// True if the nominal flange at `q` is within reach of a place where it was measured, and inside

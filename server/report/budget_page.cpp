@@ -132,16 +132,15 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
             html_text(fmt::format("At the poses since session {}: {}", line.since_session,
                                   sentence(line))) +
             "</p>";
-  const auto stands_out = [](const BudgetLine& line) { return !line.action.empty(); };
   text += fmt::format(
       "<p class=\"note\">The drawing is off by {:.4f} mm rms at {} poses. Touching base and tool "
       "frames would leave {:.4f} mm. {}Steps lead from the drawing to the whole error: each begins "
       "where the one above it ends, and their shares add to 100 %. Alone: what a line does to the "
       "poses. Left: what would be left if only this line were put right.</p>",
       to_mm(view.error_rms), budget->poses, to_mm(budget->beyond_frames.error_rms),
-      std::any_of(view.lines.begin(), view.lines.end(), stands_out)
-          ? ""
-          : "No zero, length, angle or tool is far from what arms of its kind show. ");
+      is_usual(view.lines)
+          ? "No zero, length, angle or tool is far from what arms of its kind show. "
+          : "");
   text += html_table({"budget stacks",
                       {"line", "value ± U (k = 2)", "steps", "share", "share beyond frames",
                        "alone, mm rms", "left, mm rms", "times usual"},

@@ -252,6 +252,24 @@ TEST(ModelNotes, ABaseThatStandsElsewhereThanTheCellFileHasItLeadsWithItsPlace) 
   EXPECT_FALSE(note_of(anew, "base_elsewhere")) << "somebody asked for it to be found anew";
 }
 
+TEST(ModelNotes, ABaseThatIsOffAsAWrongFirstLengthWouldMakeItWaitsForAPerson) {
+  const auto moved = [](double aside, double along, double about) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.physics.values.head<6>() << aside, 0, along, about, 0, 0;
+    return note_of(parts, "base_elsewhere");
+  };
+  const auto longer = moved(0, 18e-3, 0);
+  ASSERT_TRUE(longer);
+  EXPECT_EQ(longer->severity, Note::Severity::kStop);
+  EXPECT_NE(longer->text.find("18.0 mm in its first length"), std::string::npos) << longer->text;
+  const auto turned = moved(0, 0, from_deg(2));
+  ASSERT_TRUE(turned);
+  EXPECT_EQ(turned->severity, Note::Severity::kStop);
+  EXPECT_NE(turned->text.find("2.00 deg in the zero of joint 1"), std::string::npos)
+      << turned->text;
+  EXPECT_EQ(moved(0.1, 18e-3, 0)->severity, Note::Severity::kWarning) << "it stands elsewhere";
+}
+
 TEST(ModelNotes, RoundedMeasurementsAreHeldAgainstTheStatedSigma) {
   CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
   parts.measured.emplace().approaches.resize(6);
@@ -323,12 +341,15 @@ TEST(ModelNotes, LengthsThatAreAllOffByOneShareAreSaidWithWhatMayMakeThemSo) {
     }
     return parts;
   };
-  const auto note = note_of(scaled(1e-3, 0), "lengths_scaled");
+  const auto note = note_of(scaled(5e-4, 0), "lengths_scaled");
   ASSERT_TRUE(note);
   EXPECT_EQ(note->severity, Note::Severity::kWarning);
-  EXPECT_NE(note->text.find("about 0.10 % longer than drawn"), std::string::npos) << note->text;
+  EXPECT_NE(note->text.find("about 0.05 % longer than drawn"), std::string::npos) << note->text;
   EXPECT_NE(note->text.find("the instrument's scale"), std::string::npos) << note->text;
-  EXPECT_NE(note->text.find("83 K warmer"), std::string::npos) << note->text;
+  EXPECT_NE(note->text.find("42 K warmer"), std::string::npos) << note->text;
+  const auto beyond = note_of(scaled(1e-3, 0), "lengths_scaled");
+  ASSERT_TRUE(beyond);
+  EXPECT_EQ(beyond->severity, Note::Severity::kStop) << "no warmth makes an arm 0.1 % longer";
   EXPECT_TRUE(note_of(scaled(1e-3, 20e-6), "lengths_scaled"));
   EXPECT_TRUE(note_of(scaled(-5e-4, 10e-6), "lengths_scaled"));
   EXPECT_FALSE(note_of(scaled(0, 0.3e-3), "lengths_scaled")) << "errors of making";

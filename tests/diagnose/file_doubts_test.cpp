@@ -65,6 +65,23 @@ TEST(FileDoubts, ALinkThatIsWrongInTheFileLeadsThoughTheListOfCausesExplainsIt) 
   EXPECT_EQ(right.sentence.find("drawing"), std::string::npos) << right.sentence;
 }
 
+TEST(FileDoubts, ALinkThatABiasLearnsStopsAModelWithoutGeometry) {
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 5);
+  const auto stop_with = [&](const std::shared_ptr<const Cell>& cell, const std::string& level) {
+    TrainOptions options;
+    options.level = level;
+    options.bias = "se";
+    return stop_of(test::demand(train(cell, batch, options)));
+  };
+  const auto wrong = cell_with("a_mm: 1280", "a_mm: 1285");
+  const auto stop = stop_with(wrong, "M1");
+  ASSERT_TRUE(stop) << "positions fit, and the controller solves corrected poses with its own arm";
+  EXPECT_EQ(stop->code, kOffDrawing);
+  EXPECT_NE(stop->text.find("a2 by -"), std::string::npos) << stop->text;
+  const auto none = stop_with(test::cell_7(), "M1");
+  EXPECT_FALSE(none) << none->text;
+}
+
 TEST(FileDoubts, OfLostZerosAloneItAsksForMasteringAndLeadsWithTheirMillimetres) {
   const VirtualRobot robot = with_value(test::chapter_5_robot(test::cell_7()), "q4", from_deg(3));
   const Diagnosis found = diagnosed(test::cell_7(), test::measured(robot, 80, 5));

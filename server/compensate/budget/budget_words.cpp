@@ -110,6 +110,13 @@ std::vector<std::string> difference_in_words(const ModelDifference& difference, 
   return text;
 }
 
+bool is_usual(const std::vector<BudgetLine>& lines) {
+  const bool asked = std::any_of(lines.begin(), lines.end(), [](const BudgetLine& line) {
+    return line.kind == LineKind::kJointZero || line.kind == LineKind::kLength;
+  });
+  return asked && std::none_of(lines.begin(), lines.end(), stands_out);
+}
+
 std::string doubt_of_file(const ErrorBudget& budget) {
   std::vector<std::string> lengths;
   for (const BudgetLine& line : budget.as_it_stands.lines)
@@ -138,12 +145,12 @@ std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   std::vector<std::string> text;
   if (std::string doubt = doubt_of_file(budget); !doubt.empty()) text.push_back(std::move(doubt));
   const std::vector<BudgetLine>& lines = budget.as_it_stands.lines;
-  const bool usual = std::none_of(lines.begin(), lines.end(), stands_out);
   text.push_back(fmt::format(
       "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave "
       "{:.3f} mm{}",
       to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms),
-      usual ? "; no zero, length, angle or tool is far from what arms of its kind show" : ""));
+      is_usual(lines) ? "; no zero, length, angle or tool is far from what arms of its kind show"
+                      : ""));
   for (const BudgetLine& line : budget.as_it_stands.lines) {
     const bool shown =
         most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;

@@ -26,6 +26,9 @@ namespace trammel {
 /// `is this the file of this robot? ...` if several lengths stand out; else empty.
 [[nodiscard]] std::string doubt_of_file(const ErrorBudget& budget);
 
+/// True if zeros or lengths were identified and no line stands out.
+[[nodiscard]] bool is_usual(const std::vector<BudgetLine>& lines);
+
 /// The lines that stand out and their repairs, in one sentence. Empty: no line stands out.
 [[nodiscard]] std::string lead_of(const ErrorBudget& budget);
 

@@ -269,6 +269,7 @@ WhatWasMeasured measured_from(const Json& json) {
     measured.joint_rounding = {number_from(rounding, "step_rad"),
                                number_from(rounding, "stddev_m")};
   }
+  if (json.contains("off_drawing")) measured.off_drawing = json.at("off_drawing");
   if (!json.contains("temperature_c")) return measured;
   const Json& temperature = json.at("temperature_c");
   measured.temperature = {number_from(temperature, "least"), number_from(temperature, "most")};

@@ -55,8 +55,8 @@ void tell_file_doubts(const std::shared_ptr<const Cell>& cell,
       diagnosis.notes.push_back(*std::move(note));
   };
   if (found) {
-    if (!has_sessions(batch)) add(base_elsewhere(found->model));
     add(robot_off_drawing(found->model, found->parameters, found->discrepancy));
+    if (!has_sessions(batch)) add(base_elsewhere(found->model));
     add(lengths_scaled(found->model, found->parameters, found->covariance));
   }
   if (const auto rounding = coarse_rounding(batch, *cell)) add(measurements_rounded(*rounding));

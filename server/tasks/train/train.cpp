@@ -19,6 +19,7 @@
 #include "server/measurement/split.h"
 #include "server/tasks/train/among_twins.h"
 #include "server/tasks/train/bias_learning.h"
+#include "server/tasks/train/drawing_doubted.h"
 #include "server/tasks/train/extrapolation.h"
 #include "server/tasks/train/given_up.h"
 #include "server/tasks/train/left_out.h"
@@ -129,6 +130,7 @@ void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch,
                      const MeasurementBatch& trained, const TrainOptions& options) {
   record_domain(parts, trained);
   add_what_is_stated(parts.physics, batch.rows(), *parts.measured);
+  parts.measured->off_drawing = drawing_doubted(parts.physics, trained);
   for (const Measurement& m : trained.measurements)
     parts.trained_with.emplace(m.context.tool, m.context.payload);
   record_temperature(parts, trained);
