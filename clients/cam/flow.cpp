@@ -273,6 +273,7 @@ std::vector<bool> behind(const Flow& flow, const std::vector<std::size_t>& steps
   while (!open.empty()) {
     const std::size_t step = open.back();
     open.pop_back();
+    if (step >= flow.next.size()) continue;  // the end of a program, or an empty one
     for (const std::size_t after : flow.next[step]) {
       if (after >= found.size() || found[after]) continue;
       found[after] = true;

@@ -116,6 +116,13 @@ TEST(Gauges, ABarThatIsTwoThingsOrNothingIsRefused) {
   EXPECT_EQ(refusal_gauges(head + "a,1,,,,b\n" + other), Refusal("wires.csv", 2, "from_pose_id"));
 }
 
+TEST(Gauges, AWireThatReadsNothingIsNoContact) {
+  const std::string head = "pose_id,q1_deg,distance_mm,anchor_id\na,1,500,wire\n";
+  EXPECT_EQ(refusal_gauges(head + "b,2,0,wire\n"),
+            Refusal("wires.csv", 3, "distance_mm").beyond(0, 0));
+  EXPECT_TRUE(parse_batch_csv(head + "b,2,0,spike\n", "wires.csv"));
+}
+
 Cell cell_with(const std::string& anchors) {
   hidden::World world;
   world.tools = {Eigen::Matrix4d::Identity()};

@@ -259,6 +259,43 @@ void add_program_options(CLI::App& command, PlanArguments& arguments) {
       ->capture_default_str();
 }
 
+/// How the poses are chosen, and for what.
+void add_choice_options(CLI::App& command, PlanArguments& arguments) {
+  command
+      .add_option("--criterion", arguments.criterion,
+                  "How poses are chosen: lhs, spread evenly over the joint ranges (Latin "
+                  "hypercube); observability, so that the parameters of the cell's error sources "
+                  "become certain; separate:CAUSE,CAUSE, to tell the first cause from the second")
+      ->capture_default_str();
+  CLI::Option* twice = command.add_flag(
+      "--bidirectional", arguments.options.bidirectional,
+      "Every pose twice, once with all joints from above and once from below (else once, each "
+      "joint from above at one half of the poses and from below at the other)");
+  command
+      .add_flag("--one-way", arguments.options.one_way,
+                "Every pose once, all joints from below: a model of such poses promises nothing "
+                "of poses that are approached from above")
+      ->excludes(twice)
+      ->excludes("--from");
+  command.add_flag("--positions-only", arguments.positions_only,
+                   "Choose for a single reflector, which shows no orientations");
+  command
+      .add_option("--contact-mm", arguments.contact_mm,
+                  "Point x,y,z in the robot's base, mm, that the tip meets in all poses (a "
+                  "spike): approach it by hand, these poses keep no distance from it")
+      ->delimiter(',')
+      ->expected(3)
+      ->excludes("--from");
+  command
+      .add_option("--tool", arguments.options.tools,
+                  "Tool id of the cell; several, joined by commas, are planned for in turn")
+      ->delimiter(',');
+  command
+      .add_option("--payload", arguments.options.payloads,
+                  "Payload id of the cell; several, joined by commas, are planned for in turn")
+      ->delimiter(',');
+}
+
 }  // namespace
 
 void add_plan_command(CLI::App& app, Action& chosen) {
@@ -284,39 +321,7 @@ void add_plan_command(CLI::App& app, Action& chosen) {
       ->excludes(count)
       ->excludes(check);
   add_seed_option(*command, options.seed, "Seed of the draw");
-  command
-      ->add_option("--criterion", arguments->criterion,
-                   "How poses are chosen: lhs, spread evenly over the joint ranges (Latin "
-                   "hypercube); observability, so that the parameters of the cell's error sources "
-                   "become certain; separate:CAUSE,CAUSE, to tell the first cause from the second")
-      ->capture_default_str();
-  CLI::Option* twice = command->add_flag(
-      "--bidirectional", options.bidirectional,
-      "Every pose twice, once with all joints from above and once from below (else once, each "
-      "joint from above at one half of the poses and from below at the other)");
-  command
-      ->add_flag("--one-way", options.one_way,
-                 "Every pose once, all joints from below: a model of such poses promises nothing "
-                 "of poses that are approached from above")
-      ->excludes(twice)
-      ->excludes("--from");
-  command->add_flag("--positions-only", arguments->positions_only,
-                    "Choose for a single reflector, which shows no orientations");
-  command
-      ->add_option("--contact-mm", arguments->contact_mm,
-                   "Point x,y,z in the robot's base that the tip meets in all poses (a spike): "
-                   "approach it by hand, these poses keep no distance from it")
-      ->delimiter(',')
-      ->expected(3)
-      ->excludes("--from");
-  command
-      ->add_option("--tool", options.tools,
-                   "Tool id of the cell; several, joined by commas, are planned for in turn")
-      ->delimiter(',');
-  command
-      ->add_option("--payload", options.payloads,
-                   "Payload id of the cell; several, joined by commas, are planned for in turn")
-      ->delimiter(',');
+  add_choice_options(*command, *arguments);
   command
       ->add_option("-o,--output", arguments->output,
                    "Plan to write (CSV: joints in deg, rails in mm)")

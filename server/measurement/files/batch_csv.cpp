@@ -274,6 +274,27 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row,
   return measurement;
 }
 
+/// Refuses a distance of 0 to an anchor whose other distances are none: a wire that stands still or
+/// broke reads 0 as well, and the tip did not meet the point.
+Status check_zeros(const MeasurementBatch& batch) {
+  std::set<std::string> measured;  // anchors with distances above 0
+  for (const Measurement& m : batch.measurements)
+    if (m.gauge && m.gauge->kind == Gauge::Kind::kDistance) measured.insert(m.gauge->anchor);
+  for (const Measurement& m : batch.measurements) {
+    if (!m.gauge || m.gauge->kind != Gauge::Kind::kContact || !measured.contains(m.gauge->anchor))
+      continue;
+    return refused("distance_mm is 0, and other rows have distances to the same anchor")
+        .in(batch.where)
+        .at_row(m.row)
+        .of("distance_mm")
+        .beyond(0, 0)
+        .next(
+            "leave the row out where the instrument read nothing; contacts of the tip with a point "
+            "need an anchor_id of their own");
+  }
+  return {};
+}
+
 /// Links each gauge that is read against another pose to that pose, and removes the rows that hold
 /// such a pose only. Refuses a missing pose, and a row without a value that no gauge refers to.
 Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& line_of_pose) {
@@ -340,6 +361,7 @@ Result<MeasurementBatch> batch_of(const Result<CsvTable>& table, const std::stri
     batch.measurements.push_back(std::move(measurement));
   }
   if (columns.has_gauges()) {
+    TRY(check_zeros(batch));
     TRY(settle_gauges(batch, line_of_pose));
   }
   return batch;
