@@ -37,7 +37,8 @@ class Backlash final : public ErrorSource {
     const double torque = kinematics.gravity_torque()(joint_);
     if (jacobian != nullptr) {
       const double rate = direction * values(1) * std::copysign(1.0, torque);
-      jacobian->pass_on_to_joint(joint_, rate * kinematics.gravity_torque_jacobian().row(joint_));
+      if (rate != 0)
+        jacobian->pass_on_to_joint(joint_, rate * kinematics.gravity_torque_jacobian().row(joint_));
       jacobian->add_to_joint(joint_, first_column, direction);
       jacobian->add_to_joint(joint_, first_column + 1, direction * std::abs(torque));
     }

@@ -77,7 +77,8 @@ class ComplianceFirstOrder final : public Compliance {
     if (jacobian != nullptr) {
       const std::vector<int> rows = joint_rows(*state.chain);
       const Square bars = state.chain->bars();
-      jacobian->pass_on(rows, bars * C.asDiagonal() * kinematics.gravity_torque_jacobian());
+      if (!C.isZero(0))
+        jacobian->pass_on(rows, bars * C.asDiagonal() * kinematics.gravity_torque_jacobian());
       add_by_C(bars * torque.asDiagonal(), rows, first_column, *jacobian);
     }
     deflect(state, C.cwiseProduct(torque));

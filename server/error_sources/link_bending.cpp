@@ -37,21 +37,25 @@ class LinkBending final : public ErrorSource {
     points << link.start, link.end, link.cog, link.tip, link.weight;
     const Vector6 unit = motion<double>(points);
     if (jacobian != nullptr) {
-      using Dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 15, 1>>;
-      Eigen::Matrix<Dual, 15, 1> dual;
-      for (int i = 0; i < 15; ++i) dual(i) = Dual(points(i), 15, i);
-      const Eigen::Matrix<Dual, 6, 1> with_derivative = motion<Dual>(dual);
-      Eigen::Matrix<double, 6, 15> by_points;
-      for (int i = 0; i < 6; ++i) by_points.row(i) = with_derivative(i).derivatives().transpose();
-      const int tip = jacobian->rows.tip(0);
-      jacobian->pass_on(jacobian->rows.whole_tip(),
-                        values(0) * by_points * kinematics.loaded_link_jacobian(joint_));
-      jacobian->add_block(tip, first_column, unit);
+      if (values(0) != 0)
+        jacobian->pass_on(jacobian->rows.whole_tip(),
+                          values(0) * motion_by(points) * kinematics.loaded_link_jacobian(joint_));
+      jacobian->add_block(jacobian->rows.tip(0), first_column, unit);
     }
     state.tip_W += values(0) * unit;
   }
 
  private:
+  /// The derivative of motion() by the points.
+  static Eigen::Matrix<double, 6, 15> motion_by(const Eigen::Matrix<double, 15, 1>& points) {
+    using Dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 15, 1>>;
+    Eigen::Matrix<Dual, 15, 1> dual;
+    for (int i = 0; i < 15; ++i) dual(i) = Dual(points(i), 15, i);
+    const Eigen::Matrix<Dual, 6, 1> with_derivative = motion<Dual>(dual);
+    Eigen::Matrix<double, 6, 15> by_points;
+    for (int i = 0; i < 6; ++i) by_points.row(i) = with_derivative(i).derivatives().transpose();
+    return by_points;
+  }
   /// Motion of the tool point [translation; rotation vector] in W for 1/EI = 1.
   template <typename T>
   static Eigen::Matrix<T, 6, 1> motion(const Eigen::Matrix<T, 15, 1>& points) {

@@ -49,8 +49,9 @@ class LoadedRipple final : public ErrorSource {
       by_torque += values(k + 1) * sine + values(k + 2) * cosine;
     }
     if (jacobian != nullptr) {
-      jacobian->pass_on_to_joint(joint_,
-                                 by_torque * kinematics.gravity_torque_jacobian().row(joint_));
+      if (by_torque != 0)
+        jacobian->pass_on_to_joint(joint_,
+                                   by_torque * kinematics.gravity_torque_jacobian().row(joint_));
       add_columns(torque, q, values, *jacobian, first_column);
     }
     state.add_to_joint(joint_, torque * by_torque);

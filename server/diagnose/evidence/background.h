@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <memory>
 
 namespace trammel::cause_search {
 
@@ -28,11 +29,14 @@ class Background {
   [[nodiscard]] Eigen::MatrixXd estimate(const Eigen::MatrixXd& y) const;
   /// p x p: their posterior covariance, whatever y is.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
+  /// The same for this background and its copies, and for no other one.
+  [[nodiscard]] const std::shared_ptr<const int>& identity() const { return identity_; }
 
  private:
   Eigen::MatrixXd columns_;
   Eigen::MatrixXd inverse_;  // L⁻¹
   Eigen::MatrixXd root_;
+  std::shared_ptr<const int> identity_ = std::make_shared<const int>();
 };
 
 }  // namespace trammel::cause_search

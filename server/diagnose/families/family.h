@@ -33,11 +33,13 @@ struct Best {
 /// pose.
 struct Shares {
   Eigen::MatrixXd along;   ///< N x k: g's rows of each pose times those of the projected data
-  Eigen::MatrixXd root;    ///< N x p: the same with the background's root
   Eigen::VectorXd square;  ///< N: g's own
 };
 /// Columns g that several families share, by name.
-using KnownShares = std::map<std::string, Shares>;
+struct KnownShares {
+  std::map<std::string, Shares> of_data;
+  std::map<std::string, Eigen::MatrixXd> of_root;
+};
 
 /// The rows as one scan sees them, with one set of data.
 struct View {
@@ -51,6 +53,31 @@ struct View {
 [[nodiscard]] const Shares& shares_of(const LinearProblem& problem, const View& view,
                                       const std::string& name, const Eigen::VectorXd& g,
                                       const Eigen::MatrixXd& projected);
+/// N x p: the same sums with the background's root.
+[[nodiscard]] const Eigen::MatrixXd& root_shares_of(const LinearProblem& problem, const View& view,
+                                                    const std::string& name,
+                                                    const Eigen::VectorXd& g);
+
+/// A family's own numbers beside a background, whatever the data: many sets of data are scanned
+/// beside one. Kept for the last background all of whose rows were scanned. Not for two threads.
+template <typename T>
+class BesideBackground {
+ public:
+  /// As made by `make` for this view, now or before.
+  template <typename Make>
+  [[nodiscard]] T& of(const View& view, const Make& make) const {
+    if (view.keep != nullptr) return some_rows_ = make();
+    if (background_ != view.background.identity()) {
+      all_rows_ = make();
+      background_ = view.background.identity();
+    }
+    return all_rows_;
+  }
+
+ private:
+  mutable std::shared_ptr<const int> background_;
+  mutable T all_rows_, some_rows_;
+};
 
 /// nat: of `freedom` numbers of equal prior variance, chosen by the data, that explain `strength`.
 [[nodiscard]] double log_evidence(double strength, double freedom);

@@ -32,6 +32,10 @@ std::string Family::label() const {
 
 namespace {
 
+VectorXd kept_rows(const View& view, const VectorXd& g) {
+  return view.keep ? VectorXd(view.keep->cwiseProduct(g)) : g;
+}
+
 /// N x k: the rows of each pose, times g's, summed up. Column by column, as they lie in memory.
 MatrixXd summed_up(const LinearProblem& problem, const VectorXd& g, const MatrixXd& rows) {
   MatrixXd sums(problem.poses(), rows.cols());
@@ -51,12 +55,21 @@ MatrixXd summed_up(const LinearProblem& problem, const VectorXd& g, const Matrix
 
 const Shares& shares_of(const LinearProblem& problem, const View& view, const std::string& name,
                         const VectorXd& g, const MatrixXd& projected) {
-  const auto known = view.known->find(name);
-  if (known != view.known->end()) return known->second;
-  const VectorXd kept = view.keep ? VectorXd(view.keep->cwiseProduct(g)) : g;
-  Shares shares{summed_up(problem, kept, projected),
-                summed_up(problem, kept, view.background.root()), summed_up(problem, kept, kept)};
-  return view.known->insert_or_assign(name, std::move(shares)).first->second;
+  auto& all = view.known->of_data;
+  const auto known = all.find(name);
+  if (known != all.end()) return known->second;
+  const VectorXd kept = kept_rows(view, g);
+  Shares shares{summed_up(problem, kept, projected), summed_up(problem, kept, kept)};
+  return all.insert_or_assign(name, std::move(shares)).first->second;
+}
+
+const MatrixXd& root_shares_of(const LinearProblem& problem, const View& view,
+                               const std::string& name, const VectorXd& g) {
+  auto& all = view.known->of_root;
+  const auto known = all.find(name);
+  if (known != all.end()) return known->second;
+  return all.insert_or_assign(name, summed_up(problem, kept_rows(view, g), view.background.root()))
+      .first->second;
 }
 
 namespace {
@@ -76,22 +89,13 @@ class FixedFamily : public Family {
   Best typical() const override { return {.freedom = static_cast<int>(columns_.cols())}; }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
-    const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * columns_) : columns_;
-    const MatrixXd shared = transposed_product(view.background.root(), C);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C.transpose() * C -
-                                                        shared.transpose() * shared);
-    // Directions that change less than the noise at their prior's size are invisible.
-    Index hidden = 0;
-    while (hidden < C.cols() && eigen.eigenvalues()(hidden) < 1) ++hidden;
-    const Index seen = C.cols() - hidden;
+    const MatrixXd& seen = seen_.of(view, [&] { return seen_beside(view); });
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
-    if (seen == 0) return best;
-    const VectorXd scale = eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse();
-    const MatrixXd along = scale.asDiagonal() * (eigen.eigenvectors().rightCols(seen).transpose() *
-                                                 (C.transpose() * projected));
+    if (seen.cols() == 0) return best;
+    const MatrixXd along = transposed_product(seen, projected);
     for (Index k = 0; k < projected.cols(); ++k) {
       const double strength = along.col(k).squaredNorm();
-      const auto freedom = static_cast<int>(seen);
+      const auto freedom = static_cast<int>(seen.cols());
       best[static_cast<std::size_t>(k)] = {
           .evidence = log_evidence(strength, freedom), .strength = strength, .freedom = freedom};
     }
@@ -99,10 +103,24 @@ class FixedFamily : public Family {
   }
 
  private:
+  /// R x seen: the directions that these poses show, of unit variance beside the background.
+  MatrixXd seen_beside(const View& view) const {
+    const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * columns_) : columns_;
+    const MatrixXd shared = transposed_product(view.background.root(), C);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram(C) - gram(shared));
+    // Directions that change less than the noise at their prior's size are invisible.
+    Index hidden = 0;
+    while (hidden < C.cols() && eigen.eigenvalues()(hidden) < 1) ++hidden;
+    const Index seen = C.cols() - hidden;
+    const VectorXd scale = eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse();
+    return C * (eigen.eigenvectors().rightCols(seen) * scale.asDiagonal());
+  }
+
   Cause cause_;
   std::string source_;
   MatrixXd columns_;
   double surprise_;
+  BesideBackground<MatrixXd> seen_;
 };
 
 constexpr double kTypicalSag = 1e-3;  // m

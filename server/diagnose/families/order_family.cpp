@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "server/base/units.h"
 #include "server/diagnose/families/family.h"
@@ -70,14 +72,16 @@ class OrderFamily final : public Family {
     const Shares& shares = shares_in(view, projected);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     const bool one = projected.cols() == 1;
-    scan_orders(shares, one ? promising_orders(shares) : all_orders(), best);
+    scan_orders(view, shares, one ? promising_orders(shares) : all_places(), best);
     // Refines once more around the best order for the data themselves. The data are the first
     // column.
     if (one) {
       const double fine = step_ / kFineSteps;
       const double from = std::max(kLowestOrder, best[0].order - step_);
-      scan_orders(shares, VectorXd::LinSpaced(kFineOrders, from, from + fine * (kFineOrders - 1)),
-                  best);
+      const VectorXd orders =
+          VectorXd::LinSpaced(kFineOrders, from, from + fine * (kFineOrders - 1));
+      const Waves waves = waves_of(orders);
+      improve(shares, orders, waves, left_beside(view, shares.square, waves), best);
     }
     for (Best& of_data : best) of_data.evidence = log_evidence(of_data.strength, of_data.freedom);
     return best;
@@ -88,18 +92,28 @@ class OrderFamily final : public Family {
     const View view{background};
     const Shares& shares = shares_in(view, projected);
     Periodogram periodogram{joint_, all_orders(), VectorXd(orders_), 0};
-    for (Index k = 0; k < orders_; ++k) {
-      std::vector<Best> best(1);
-      scan_orders(shares, periodogram.order.segment<1>(k), best);
-      periodogram.strength(k) = best[0].strength;
+    for (Index first = 0; first < orders_; first += kOrdersAtATime) {
+      const Index count = std::min(kOrdersAtATime, orders_ - first);
+      const Waves waves = waves_of(periodogram.order.segment(first, count));
+      const std::vector<Information> left = left_beside(view, shares.square, waves);
+      const VectorXd a = waves.sine.transpose() * shares.along.col(0);
+      const VectorXd b = waves.cosine.transpose() * shares.along.col(0);
+      for (Index k = 0; k < count; ++k) {
+        const Information& own = left[static_cast<std::size_t>(k)];
+        periodogram.strength(first + k) = own.tells() ? own.strength(a(k), b(k)) : 0;
+      }
     }
     return periodogram;
   }
 
  private:
   const Shares& shares_in(const View& view, const MatrixXd& projected) const {
-    return shares_of(problem_, view, fmt::format("joint {}", joint_),
-                     problem_.by_joint().col(joint_), projected);
+    return shares_of(problem_, view, name_, problem_.by_joint().col(joint_), projected);
+  }
+  std::vector<Index> all_places() const {
+    std::vector<Index> places(static_cast<std::size_t>(orders_));
+    std::iota(places.begin(), places.end(), Index{0});
+    return places;
   }
   VectorXd all_orders() const {
     return kLowestOrder +
@@ -132,6 +146,7 @@ class OrderFamily final : public Family {
   struct Information {
     double ss = kPriorShare, cc = kPriorShare, sc = 0;
     [[nodiscard]] double determinant() const { return ss * cc - sc * sc; }
+    [[nodiscard]] bool tells() const { return determinant() > 0; }
     [[nodiscard]] double strength(double a, double b) const {
       return (cc * a * a - 2 * sc * a * b + ss * b * b) / determinant();
     }
@@ -143,11 +158,11 @@ class OrderFamily final : public Family {
             kPriorShare + cosine.cwiseAbs2().dot(square), sine.cwiseProduct(cosine).dot(square)};
   }
 
-  /// The orders among which the strongest one must be. The gain of an order without the background
-  /// is cheap to compute, and the real gain is at most that. Beyond the orders in the joint's maps,
-  /// the background absorbs at most kMostAbsorbed of a wave. An order that is weaker even so is not
-  /// the strongest.
-  VectorXd promising_orders(const Shares& shares) const {
+  /// The places of the orders among which the strongest one must be. The gain of an order without
+  /// the background is cheap to compute, and the real gain is at most that. Beyond the orders in
+  /// the joint's maps, the background absorbs at most kMostAbsorbed of a wave. An order that is
+  /// weaker even so is not the strongest.
+  std::vector<Index> promising_orders(const Shares& shares) const {
     const VectorXd orders = all_orders();
     VectorXd least(orders_);
     for (Index first = 0; first < orders_; first += kOrdersAtATime) {
@@ -159,32 +174,71 @@ class OrderFamily final : public Family {
         least(first + k) = own_information(waves, k, shares.square).strength(a(k), b(k));
     }
     const double strongest = least.maxCoeff();
-    std::vector<double> promising;
+    std::vector<Index> promising;
     for (Index k = 0; k < orders_; ++k) {
       if (orders(k) < kOrdersOfMaps || least(k) >= (1 - kMostAbsorbed) * strongest)
-        promising.push_back(orders(k));
+        promising.push_back(k);
     }
-    return Eigen::Map<const VectorXd>(promising.data(), static_cast<Index>(promising.size()));
+    return promising;
   }
 
-  /// Improves `best` where one of the `orders` is stronger.
-  void scan_orders(const Shares& shares, const VectorXd& orders, std::vector<Best>& best) const {
-    for (Index first = 0; first < orders.size(); first += kOrdersAtATime)
-      scan_some(shares, orders.segment(first, std::min(kOrdersAtATime, orders.size() - first)),
-                best);
+  /// The information of each wave that the background leaves.
+  std::vector<Information> left_beside(const View& view, const VectorXd& square,
+                                       const Waves& waves) const {
+    std::vector<Information> all;
+    if (waves.sine.cols() == 0) return all;
+    const MatrixXd& root = root_shares_of(problem_, view, name_, problem_.by_joint().col(joint_));
+    const MatrixXd sine = transposed_product(root, waves.sine);
+    const MatrixXd cosine = transposed_product(root, waves.cosine);
+    for (Index k = 0; k < sine.cols(); ++k) {
+      Information left = own_information(waves, k, square);
+      left.ss -= sine.col(k).squaredNorm();
+      left.cc -= cosine.col(k).squaredNorm();
+      left.sc -= sine.col(k).dot(cosine.col(k));
+      all.push_back(left);
+    }
+    return all;
   }
-  void scan_some(const Shares& shares, const VectorXd& orders, std::vector<Best>& best) const {
-    const Waves waves = waves_of(orders);
+
+  /// Improves `best` where an order at one of `places` is stronger.
+  void scan_orders(const View& view, const Shares& shares, const std::vector<Index>& places,
+                   std::vector<Best>& best) const {
+    std::vector<std::optional<Information>>& known = left_.of(view, [&] {
+      return std::vector<std::optional<Information>>(static_cast<std::size_t>(orders_));
+    });
+    const VectorXd orders = all_orders();
+    constexpr auto kSome = static_cast<std::size_t>(kOrdersAtATime);
+    for (std::size_t first = 0; first < places.size(); first += kSome) {
+      const std::vector<Index> some(
+          places.begin() + static_cast<std::ptrdiff_t>(first),
+          places.begin() + static_cast<std::ptrdiff_t>(std::min(first + kSome, places.size())));
+      const Waves waves = waves_of(orders(some));
+      improve(shares, orders(some), waves, recalled(view, shares.square, waves, some, known), best);
+    }
+  }
+  /// left_beside(), of which `known` has some places already and gets the others.
+  std::vector<Information> recalled(const View& view, const VectorXd& square, const Waves& waves,
+                                    const std::vector<Index>& places,
+                                    std::vector<std::optional<Information>>& known) const {
+    std::vector<Index> missing;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      if (!known[static_cast<std::size_t>(places[k])]) missing.push_back(static_cast<Index>(k));
+    }
+    const std::vector<Information> found = left_beside(
+        view, square, {waves.sine(Eigen::all, missing), waves.cosine(Eigen::all, missing)});
+    for (std::size_t k = 0; k < missing.size(); ++k)
+      known[static_cast<std::size_t>(places[static_cast<std::size_t>(missing[k])])] = found[k];
+    std::vector<Information> all;
+    for (const Index place : places) all.push_back(*known[static_cast<std::size_t>(place)]);
+    return all;
+  }
+  static void improve(const Shares& shares, const VectorXd& orders, const Waves& waves,
+                      const std::vector<Information>& information, std::vector<Best>& best) {
     const MatrixXd sine_along = transposed_product(shares.along, waves.sine);
     const MatrixXd cosine_along = transposed_product(shares.along, waves.cosine);
-    const MatrixXd sine_root = transposed_product(shares.root, waves.sine);
-    const MatrixXd cosine_root = transposed_product(shares.root, waves.cosine);
     for (Index k = 0; k < orders.size(); ++k) {
-      Information left = own_information(waves, k, shares.square);
-      left.ss -= sine_root.col(k).squaredNorm();
-      left.cc -= cosine_root.col(k).squaredNorm();
-      left.sc -= sine_root.col(k).dot(cosine_root.col(k));
-      if (!(left.determinant() > 0)) continue;
+      const Information& left = information[static_cast<std::size_t>(k)];
+      if (!left.tells()) continue;
       for (Index d = 0; d < shares.along.cols(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
         const double strength = left.strength(sine_along(d, k), cosine_along(d, k));
@@ -196,10 +250,12 @@ class OrderFamily final : public Family {
   const LinearProblem& problem_;
   const Cause cause_;
   const int joint_;
+  const std::string name_ = fmt::format("joint {}", joint_);  // of its column among the families
   VectorXd q_;
   double step_ = 0;
   Waves turn_;  // the rotation by one step
   Index orders_ = 0;
+  BesideBackground<std::vector<std::optional<Information>>> left_;  // of every order asked for
 };
 
 }  // namespace

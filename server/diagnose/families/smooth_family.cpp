@@ -58,6 +58,33 @@ VectorXd angles(const LinearProblem& problem, int joint) {
   return q;
 }
 
+/// Numbers of variance v whose information is tridiagonal: log det (1 + v T), the trace of v T (1 +
+/// v T)⁻¹, and v yᵀ (1 + v T)⁻¹ y of every row y of the data.
+struct AtSize {
+  double cost = 0, freedom = 0;
+  VectorXd strength;
+};
+AtSize at_size(const VectorXd& diagonal, const VectorXd& beside, double variance,
+               const MatrixXd& data) {
+  const Index n = diagonal.size();
+  AtSize at{0, static_cast<double>(n), VectorXd::Zero(data.rows())};
+  const VectorXd own = 1 + variance * diagonal.array();
+  const VectorXd coupling = variance * beside;
+  // 1 + v T = L D Lᵀ from above, and U E Uᵀ from below; its inverse has the diagonal 1 / (d + e -
+  // own).
+  VectorXd above = own, below = own;
+  for (Index i = 1; i < n; ++i) above(i) -= coupling(i - 1) * coupling(i - 1) / above(i - 1);
+  for (Index i = n - 2; i >= 0; --i) below(i) -= coupling(i) * coupling(i) / below(i + 1);
+  at.cost = above.array().log().sum();
+  at.freedom -= (above + below - own).cwiseInverse().sum();
+  VectorXd y = VectorXd::Zero(data.rows());
+  for (Index i = 0; i < n; ++i) {
+    y = data.col(i) - (i > 0 ? coupling(i - 1) / above(i - 1) : 0.0) * y;
+    at.strength += (variance / above(i)) * y.cwiseAbs2();
+  }
+  return at;
+}
+
 /// A random smooth function of the pose, times one or more columns g: numbers are wanted for every
 /// g and every function. Its length scale and its size are chosen by the data.
 class SmoothFamily : public Family {
@@ -67,31 +94,19 @@ class SmoothFamily : public Family {
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const final {
     const std::size_t scales = scales_looked_for();
     const Index each = deviations_[scales - 1].size();
-    const Index count = static_cast<Index>(g_.size()) * each;
     const MatrixXd functions = functions_.leftCols(each);
-    MatrixXd information = MatrixXd::Zero(count, count);
-    MatrixXd along(count, projected.cols());
-    MatrixXd root(count, view.background.root().cols());
+    const std::vector<AtScale>& known =
+        known_.of(view, [&] { return scales_beside(view, projected, functions); });
+    MatrixXd along(static_cast<Index>(g_.size()) * each, projected.cols());
     for (std::size_t s = 0; s < g_.size(); ++s) {
-      const Index first = static_cast<Index>(s) * each;
-      if (!pose_by_pose_) {
-        const VectorXd g = view.keep ? VectorXd(view.keep->cwiseProduct(g_[s])) : g_[s];
-        const MatrixXd whole = times_functions(g, functions);
-        along.middleRows(first, each) = transposed_product(whole, projected);
-        root.middleRows(first, each) = transposed_product(whole, view.background.root());
-        information.block(first, first, each, each) = gram(whole);
-        continue;
-      }
-      const Shares& shares = shares_of(problem_, view, g_names_[s], g_[s], projected);
-      along.middleRows(first, each) = transposed_product(functions, shares.along);
-      root.middleRows(first, each) = transposed_product(functions, shares.root);
-      information.block(first, first, each, each).noalias() =
-          functions.transpose() * shares.square.asDiagonal() * functions;
+      along.middleRows(static_cast<Index>(s) * each, each) =
+          pose_by_pose_
+              ? transposed_product(functions,
+                                   shares_of(problem_, view, g_names_[s], g_[s], projected).along)
+              : transposed_product(times_functions(kept(view, s), functions), projected);
     }
-    const MatrixXd across = root.transpose();
-    information -= gram(across);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
-    for (std::size_t scale = 0; scale < scales; ++scale) choose(information, along, scale, best);
+    for (std::size_t scale = 0; scale < scales; ++scale) choose(known[scale], along, scale, best);
     return best;
   }
 
@@ -134,46 +149,84 @@ class SmoothFamily : public Family {
     }
     return all;
   }
-  void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale,
-              std::vector<Best>& best) const {
+  VectorXd kept(const View& view, std::size_t s) const {
+    return view.keep ? VectorXd(view.keep->cwiseProduct(g_[s])) : g_[s];
+  }
+  /// The numbers that tell at a length scale, and their information Q T Qᵀ beside the background,
+  /// at size 1. T is tridiagonal: it decides on all sizes without its eigenvalues.
+  struct AtScale {
+    std::vector<Index> taken;
+    VectorXd deviation;
+    Eigen::Tridiagonalization<MatrixXd> information;
+  };
+  std::vector<AtScale> scales_beside(const View& view, const MatrixXd& projected,
+                                     const MatrixXd& functions) const {
+    const Index each = functions.cols();
+    const Index count = static_cast<Index>(g_.size()) * each;
+    MatrixXd information = MatrixXd::Zero(count, count);
+    MatrixXd across(view.background.root().cols(), count);
+    for (std::size_t s = 0; s < g_.size(); ++s) {
+      const Index first = static_cast<Index>(s) * each;
+      auto own = information.block(first, first, each, each);
+      if (!pose_by_pose_) {
+        const MatrixXd whole = times_functions(kept(view, s), functions);
+        across.middleCols(first, each) = transposed_product(view.background.root(), whole);
+        own = gram(whole);
+        continue;
+      }
+      const VectorXd& square = shares_of(problem_, view, g_names_[s], g_[s], projected).square;
+      across.middleCols(first, each) =
+          transposed_product(root_shares_of(problem_, view, g_names_[s], g_[s]), functions);
+      own = gram(square.cwiseSqrt().asDiagonal() * functions);
+    }
+    information -= gram(across);
+    std::vector<AtScale> all;
+    for (std::size_t scale = 0; scale < scales_looked_for(); ++scale)
+      all.push_back(at_scale(information, scale));
+    return all;
+  }
+  AtScale at_scale(const MatrixXd& information, std::size_t scale) const {
+    AtScale at;
     std::vector<Index> telling;
     for (Index k = 0; k < deviations_[scale].size(); ++k) {
       if (deviations_[scale](k) > kTelling * deviations_[scale].maxCoeff()) telling.push_back(k);
     }
-    std::vector<Index> taken;
     const Index apart = information.cols() / static_cast<Index>(g_.size());
     for (Index first = 0; first < information.cols(); first += apart) {
-      for (const Index k : telling) taken.push_back(first + k);
+      for (const Index k : telling) at.taken.push_back(first + k);
     }
-    const VectorXd deviation =
+    at.deviation =
         VectorXd(deviations_[scale](telling)).replicate(static_cast<Index>(g_.size()), 1);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
-        deviation.asDiagonal() * information(taken, taken) * deviation.asDiagonal());
-    const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
-    const MatrixXd square =
-        transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along(taken, Eigen::all))
-            .array()
-            .square()
-            .matrix();
+    at.information.compute(at.deviation.asDiagonal() * information(at.taken, at.taken) *
+                           at.deviation.asDiagonal());
+    return at;
+  }
+  void choose(const AtScale& known, const MatrixXd& along, std::size_t scale,
+              std::vector<Best>& best) const {
+    const MatrixXd turned =
+        (known.information.matrixQ().adjoint() *
+         MatrixXd(known.deviation.asDiagonal() * along(known.taken, Eigen::all)))
+            .transpose();
+    const VectorXd diagonal = known.information.diagonal();
+    const VectorXd beside = known.information.subDiagonal();
     double size = smallest_;
     for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
-      const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
-      const double cost = (1 + size * size * seen.array()).log().sum();
-      const double freedom = (gain.array() * seen.array()).sum();
-      const VectorXd strength = square.transpose() * gain;
-      for (Index d = 0; d < strength.size(); ++d) {
+      const AtSize at = at_size(diagonal, beside, size * size, turned);
+      for (Index d = 0; d < at.strength.size(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
-        const double evidence = 0.5 * (strength(d) - cost);
+        const double evidence = 0.5 * (at.strength(d) - at.cost);
         if (evidence > one.evidence) {
           one = {.evidence = evidence,
-                 .strength = strength(d),
-                 .freedom = static_cast<int>(std::ceil(freedom)),
+                 .strength = at.strength(d),
+                 .freedom = static_cast<int>(std::ceil(at.freedom)),
                  .length_scale = scale,
                  .size = size};
         }
       }
     }
   }
+
+  BesideBackground<std::vector<AtScale>> known_;
 };
 
 class JointMapFamily final : public SmoothFamily {

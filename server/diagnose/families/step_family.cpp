@@ -40,27 +40,22 @@ class StepFamily final : public Family {
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const Index m = columns_.cols();
+    const std::vector<Beginning>& beginnings =
+        beginnings_.of(view, [&] { return beginnings_beside(view); });
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     MatrixXd along = MatrixXd::Zero(m, projected.cols());
-    MatrixXd shared = MatrixXd::Zero(view.background.root().cols(), m);
-    MatrixXd own = MatrixXd::Identity(m, m);  // the prior's share
-    for (Index i = problem_.poses() - 1; i >= kFewestPoses; --i) {
-      const Index row = problem_.first_row(i);
-      const Index count = problem_.row_count(i);
-      if (view.keep && (*view.keep)(row) == 0) continue;
-      const auto C = columns_.middleRows(row, count);
-      along.noalias() += C.transpose() * projected.middleRows(row, count);
-      shared.noalias() += view.background.root().middleRows(row, count).transpose() * C;
-      own.noalias() += C.transpose() * C;
-      if (i > problem_.poses() - kFewestPoses) continue;
-      const Eigen::LLT<MatrixXd> factor(own - shared.transpose() * shared);
-      if (factor.info() != Eigen::Success) continue;
-      const MatrixXd whitened = factor.matrixL().solve(along);
+    for (const Beginning& beginning : beginnings) {
+      const Index row = problem_.first_row(beginning.pose);
+      const Index count = problem_.row_count(beginning.pose);
+      along.noalias() +=
+          columns_.middleRows(row, count).transpose() * projected.middleRows(row, count);
+      if (beginning.inverse.size() == 0) continue;
+      const MatrixXd whitened = beginning.inverse.lazyProduct(along);
       for (Index d = 0; d < projected.cols(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
         const double strength = whitened.col(d).squaredNorm();
         if (strength > one.strength)
-          one = {.strength = strength, .freedom = static_cast<int>(m), .pose = i};
+          one = {.strength = strength, .freedom = static_cast<int>(m), .pose = beginning.pose};
       }
     }
     for (Best& one : best) one.evidence = log_evidence(one.strength, one.freedom);
@@ -68,6 +63,33 @@ class StepFamily final : public Family {
   }
 
  private:
+  struct Beginning {
+    Index pose;
+    MatrixXd inverse;  ///< L⁻¹ of the information of a step that begins here, priors included;
+                       ///< empty where none can
+  };
+  /// From the last pose on.
+  std::vector<Beginning> beginnings_beside(const View& view) const {
+    const Index m = columns_.cols();
+    const MatrixXd root = view.background.root().transpose();
+    std::vector<Beginning> beginnings;
+    MatrixXd shared = MatrixXd::Zero(root.rows(), m);
+    MatrixXd own = MatrixXd::Identity(m, m);  // the prior's share
+    for (Index i = problem_.poses() - 1; i >= kFewestPoses; --i) {
+      const Index row = problem_.first_row(i);
+      const Index count = problem_.row_count(i);
+      if (view.keep && (*view.keep)(row) == 0) continue;
+      const auto C = columns_.middleRows(row, count);
+      shared += root.middleCols(row, count).lazyProduct(C);
+      own += C.transpose().lazyProduct(C);
+      beginnings.push_back({i, {}});
+      if (i > problem_.poses() - kFewestPoses) continue;
+      const Eigen::LLT<MatrixXd> factor(own - shared.transpose() * shared);
+      if (factor.info() == Eigen::Success)
+        beginnings.back().inverse = factor.matrixL().solve(MatrixXd::Identity(m, m));
+    }
+    return beginnings;
+  }
   const Measurement& measurement(const Best& best) const {
     return problem_.batch().measurements[static_cast<std::size_t>(best.pose)];
   }
@@ -76,6 +98,7 @@ class StepFamily final : public Family {
   MatrixXd columns_;
   Cause cause_;
   std::string spec_;
+  BesideBackground<std::vector<Beginning>> beginnings_;
 };
 
 class PoseFamily final : public Family {

@@ -145,6 +145,7 @@ class Doubt {
         place_(place),
         effect_(fitted(background, families[place]->columns(seen.best[place]), problem.residual())),
         projected_(background.project(effect_)),
+        view_{background},
         whole_(effect_.dot(projected_.col(0))) {}
 
   /// Repeats the batch in simulation, with the effect as it was fitted.
@@ -195,6 +196,7 @@ class Doubt {
   std::size_t place_;
   VectorXd effect_;
   MatrixXd projected_;
+  View view_;     // of the projected effect
   double whole_;  // strength of the effect
   Winners repeated_;
 };
@@ -208,7 +210,7 @@ bool Doubt::is_rival(std::size_t f, double frequency) const {
   const bool only_describes =
       no_rival(cause(), other) && (decided || !is_doubtful_case(other, cause()));
   if (only_describes || begins_at_once(other, seen_.best[f], problem_.poses())) return false;
-  const double made = families_[f]->scan({background_}, projected_).front().strength;
+  const double made = families_[f]->scan(view_, projected_).front().strength;
   if (is_as_good(f, made)) return true;
   // Another cause may exist as well; it is a rival only if it explains much of this effect.
   const bool related = made > thresholds::kRelatedShare * whole_;
