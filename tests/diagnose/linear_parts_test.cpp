@@ -75,6 +75,74 @@ TEST(Background, ProjectsAsTheInverseOfItsCovarianceDoes) {
             1e-10);
 }
 
+TEST(Background, OfSomeOfItsColumnsIsTheBackgroundOfThoseAlone) {
+  const MatrixXd Z = 3 * random_matrix(40, 6, 4);
+  const MatrixXd y = random_matrix(40, 2, 5);
+  const std::vector<Index> some = {0, 2, 5};
+  const Background alone(Z(Eigen::all, some));
+  const Background part = Background(Z).part(some);
+  EXPECT_LT((part.project(y) - alone.project(y)).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_LT((part.root() - alone.root()).cwiseAbs().maxCoeff(), 1e-10);
+}
+
+/// nat: the evidence of `columns`, per prior, beside the background.
+double evidence_of(const MatrixXd& columns, const Background& background, const VectorXd& data) {
+  const MatrixXd information = columns.transpose() * background.project(columns) +
+                               MatrixXd::Identity(columns.cols(), columns.cols());
+  const VectorXd right = columns.transpose() * background.project(data);
+  const Eigen::LLT<MatrixXd> factor(information);
+  return 0.5 * right.dot(factor.solve(right)) -
+         MatrixXd(factor.matrixL()).diagonal().array().log().sum();
+}
+
+TEST(SmoothFamily, ChoosesItsSizeByTheEvidenceOfItsColumns) {
+  const Calibrated calibrated(60);
+  const LinearProblem problem = calibrated.problem();
+  const Background background(problem.nuisance());
+  for (const std::vector<int>& joints : {std::vector<int>{}, {1}, {2, 4}}) {
+    const FamilyPtr family = make_anonymous_family(problem, joints);
+    ASSERT_NE(family, nullptr);
+    Best planted = family->typical();
+    planted.size = 1e-4;
+    const MatrixXd columns = family->columns(planted);
+    const VectorXd data = problem.residual() + columns * random_matrix(columns.cols(), 1, 8);
+    const Best best = family->scan({background}, background.project(data)).front();
+    ASSERT_GT(best.evidence, 0);
+    EXPECT_NEAR(best.evidence, evidence_of(family->columns(best), background, data),
+                1e-6 * best.evidence);
+  }
+}
+
+/// The best of every family in `data`.
+std::vector<Best> best_of(const std::vector<FamilyPtr>& families, const View& view,
+                          const VectorXd& data) {
+  std::vector<Best> all;
+  for (const FamilyPtr& family : families)
+    all.push_back(family->scan(view, view.background.project(data)).front());
+  return all;
+}
+
+TEST(Families, SayTheSameBesideABackgroundWhateverWasScannedBefore) {
+  const Calibrated calibrated(60);
+  const LinearProblem problem = calibrated.problem();
+  const Background first(problem.nuisance());
+  const Background second(problem.nuisance().leftCols(problem.nuisance().cols() / 2));
+  VectorXd keep = VectorXd::Ones(problem.rows());
+  keep.segment(problem.first_row(20), problem.row_count(20)).setZero();
+  const Background some_rows(keep.asDiagonal() * problem.nuisance());
+  const VectorXd data = 3 * random_matrix(problem.rows(), 1, 7);
+  const std::vector<FamilyPtr> families = make_families(problem);
+  for (const View& view : {View{first}, View{first}, View{some_rows, &keep}, View{second},
+                           View{some_rows, &keep}, View{second}}) {
+    const std::vector<Best> now = best_of(families, view, data),
+                            anew = best_of(make_families(problem), view, data);
+    for (std::size_t f = 0; f < families.size(); ++f) {
+      EXPECT_EQ(now[f].strength, anew[f].strength) << families[f]->label();
+      EXPECT_EQ(now[f].evidence, anew[f].evidence) << families[f]->label();
+    }
+  }
+}
+
 TEST(LogEvidence, IsInvertedByStrengthFor) {
   for (const double freedom : {1.0, 2.0, 6.0, 30.0}) {
     EXPECT_NEAR(log_evidence(strength_for(12, freedom), freedom), 12, 1e-6);

@@ -26,16 +26,26 @@ MatrixXd inverse_factor_of(const MatrixXd& information) {
   return information.llt().matrixL().solve(MatrixXd::Identity(n, n));
 }
 
-Background::Background(MatrixXd columns) : Background(columns, information_of(columns)) {}
-
-Background::Background(MatrixXd columns, const MatrixXd& information)
+Background::Background(MatrixXd columns)
     : columns_(std::move(columns)),
-      inverse_(inverse_factor_of(information)),
-      root_(times_lower_transposed(columns_, inverse_)) {}
+      information_(information_of(columns_)),
+      inverse_(inverse_factor_of(information_)) {}
 
-MatrixXd Background::project(const MatrixXd& y) const {
-  return y - root_ * transposed_product(root_, y);
+Background::Background(MatrixXd columns, MatrixXd information)
+    : columns_(std::move(columns)),
+      information_(std::move(information)),
+      inverse_(inverse_factor_of(information_)) {}
+
+Background Background::part(const std::vector<Index>& places) const {
+  return {columns_(Eigen::all, places), information_(places, places)};
 }
+
+const MatrixXd& Background::root() const {
+  if (root_.size() == 0) root_ = times_lower_transposed(columns_, inverse_);
+  return root_;
+}
+
+MatrixXd Background::project(const MatrixXd& y) const { return y - columns_ * estimate(y); }
 
 MatrixXd Background::estimate(const MatrixXd& y) const {
   return inverse_.transpose() * (inverse_ * transposed_product(columns_, y));

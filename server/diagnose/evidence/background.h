@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <memory>
+#include <vector>
 
 namespace trammel::cause_search {
 
@@ -17,12 +18,14 @@ class Background {
  public:
   explicit Background(Eigen::MatrixXd columns);
   /// The background with 1 + ZᵀZ known.
-  Background(Eigen::MatrixXd columns, const Eigen::MatrixXd& information);
+  Background(Eigen::MatrixXd columns, Eigen::MatrixXd information);
 
   /// S⁻¹ y of every column.
   [[nodiscard]] Eigen::MatrixXd project(const Eigen::MatrixXd& y) const;
-  /// R x p: U.
-  [[nodiscard]] const Eigen::MatrixXd& root() const { return root_; }
+  /// The background of its columns at `places` alone.
+  [[nodiscard]] Background part(const std::vector<Eigen::Index>& places) const;
+  /// R x p: U, worked out when it is first asked for, by one thread.
+  [[nodiscard]] const Eigen::MatrixXd& root() const;
   /// R x p: Z.
   [[nodiscard]] const Eigen::MatrixXd& columns() const { return columns_; }
   /// p x k: posterior means of the unknown numbers, given each column of y.
@@ -34,8 +37,9 @@ class Background {
 
  private:
   Eigen::MatrixXd columns_;
-  Eigen::MatrixXd inverse_;  // L⁻¹
-  Eigen::MatrixXd root_;
+  Eigen::MatrixXd information_;  // 1 + ZᵀZ
+  Eigen::MatrixXd inverse_;      // L⁻¹
+  mutable Eigen::MatrixXd root_;
   std::shared_ptr<const int> identity_ = std::make_shared<const int>();
 };
 

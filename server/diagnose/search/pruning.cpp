@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "server/diagnose/evidence/background.h"
 #include "server/diagnose/evidence/effect.h"
@@ -101,13 +102,16 @@ std::optional<std::size_t> weak_cause(const SearchResult& result, double limit) 
 }
 
 std::optional<std::size_t> weak_function(const SearchResult& result, double limit) {
+  if (result.unnamed.empty()) return std::nullopt;
   const LinearProblem problem = problem_of(result);
+  const Background all(background_columns(problem, result.unnamed));
+  Index first = problem.nuisance().cols();
   for (std::size_t k = 0; k < result.unnamed.size(); ++k) {
-    std::vector<Unnamed> others = result.unnamed;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    const Background rest(background_columns(problem, others));
-    const MatrixXd columns = problem.weight().asDiagonal() * result.unnamed[k].columns;
-    if (!(evidence_of(columns, rest, problem.residual()) >= limit)) return k;
+    std::vector<Index> own(static_cast<std::size_t>(result.unnamed[k].columns.cols()));
+    std::iota(own.begin(), own.end(), first);
+    first += std::ssize(own);
+    const Background rest = all.part(all_but(all.columns().cols(), own));
+    if (!(evidence_of(all.columns()(Eigen::all, own), rest, problem.residual()) >= limit)) return k;
   }
   return std::nullopt;
 }

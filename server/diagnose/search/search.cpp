@@ -1,6 +1,7 @@
 #include "server/diagnose/search/search.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "server/diagnose/evidence/effect.h"
@@ -237,10 +238,11 @@ bool Search::is_function(const Standing& standing, const Choice& choice, std::si
 /// nat: the joint gain of the best few named causes, taken one after the other.
 double Search::named_path_score(const Standing& standing, const Admitted& open) const {
   MatrixXd columns = standing.columns;
+  std::optional<Background> with_steps;
   std::vector<std::size_t> steps;  // taken already
   double total = 0;
   for (int k = 0; k < thresholds::kNamedPath; ++k) {
-    const Background background(columns);
+    const Background& background = with_steps ? std::as_const(*with_steps) : standing.background;
     // A second step of one cause only turns the first step into a better ramp.
     const auto is_new = [&](std::size_t f) {
       const Cause cause = standing.families[f]->cause(standing.families[f]->typical());
@@ -256,6 +258,7 @@ double Search::named_path_score(const Standing& standing, const Admitted& open) 
     const MatrixXd chosen = standing.families[*best]->columns(seen.best[*best]);
     columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
     columns.rightCols(chosen.cols()) = chosen;
+    if (k + 1 < thresholds::kNamedPath) with_steps.emplace(columns);
   }
   return total;
 }

@@ -107,10 +107,11 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   VectorXd data = after.residual();
   std::vector<Index> chosen(static_cast<std::size_t>(after.nuisance().cols()));
   std::iota(chosen.begin(), chosen.end(), Index{0});
+  const Background all(after.nuisance());
   std::vector<WaterfallStep> tail;
   for (auto finding = found.accepted.rbegin(); finding != found.accepted.rend(); ++finding) {
     if (finding->is_outlier()) continue;
-    const Background fitted(after.nuisance()(Eigen::all, chosen));
+    const Background fitted = all.part(chosen);
     tail.push_back({to_string(finding->cause),
                     after.position_rms(data - fitted.columns() * fitted.estimate(data))});
     data += effect_of_source(after, finding->in_model);

@@ -34,6 +34,12 @@ struct Estimated {
   MatrixXd covariance;
 };
 
+/// Every free column on a half of the poses.
+struct Half {
+  std::vector<Index> rows;
+  Background columns;
+};
+
 Estimate in_units(const Parameter& parameter, double value, double stddev) {
   return {parameter.name, parameter.unit, parameter.scale * value,
           parameter.scale * kExpanded * stddev};
@@ -202,8 +208,9 @@ class Findings {
   std::vector<Cause> causes_;
   double limit_;  // nat: the line of a finding
   Beside beside_;
-  MatrixXd columns_;
+  Background all_columns_;
   Estimated estimated_;
+  std::vector<Half> halves_;  // where more than noise is left
   Folds folds_;
   VectorXd held_out_;
   std::vector<FamilyPtr> families_;     // empty if no finding begins at a pose
@@ -217,9 +224,21 @@ std::vector<Cause> causes_of(const std::vector<Accepted>& accepted) {
   return causes;
 }
 
-Estimated estimated_beside(const MatrixXd& columns, const VectorXd& data) {
-  const Background all(columns);
-  return {all.estimate(data), all.covariance()};
+/// The halves of the poses: every second block of them, and the remaining blocks.
+std::vector<Half> halves_of(const LinearProblem& problem, const MatrixXd& columns) {
+  const Index block = std::max<Index>(1, problem.poses() / kBlocksOfHalves);
+  std::vector<Half> halves;
+  for (const Index half : {0, 1}) {
+    std::vector<Index> rows;
+    for (Index i = 0; i < problem.poses(); ++i) {
+      if ((i / block) % 2 != half) continue;
+      for (Index row = problem.first_row(i); row < problem.first_row(i + 1); ++row)
+        rows.push_back(row);
+    }
+    Background background(columns(rows, Eigen::all));
+    halves.push_back({std::move(rows), std::move(background)});
+  }
+  return halves;
 }
 
 bool begins(const Accepted& one) { return !one.is_outlier() && !one.cause.pose_id.empty(); }
@@ -234,9 +253,11 @@ Findings::Findings(const SearchResult& found, const LinearProblem& problem,
       limit_(found.chance.limit),
       beside_{causes_,       unexplained,     surrogates, recorded, remainder.more_than_noise,
               remainder.rms, remainder.larger},
-      columns_(background_columns(problem, found.unnamed)),
-      estimated_(estimated_beside(columns_, problem.residual())),
-      folds_(problem, columns_),
+      all_columns_(background_columns(problem, found.unnamed)),
+      estimated_{all_columns_.estimate(problem.residual()), all_columns_.covariance()},
+      halves_(remainder.more_than_noise ? halves_of(problem, all_columns_.columns())
+                                        : std::vector<Half>()),
+      folds_(problem, all_columns_.columns()),
       held_out_(folds_.held_out_residual(problem.residual())) {
   if (std::any_of(found.accepted.begin(), found.accepted.end(), begins))
     families_ = make_families(problem);
@@ -306,9 +327,9 @@ Finding Findings::cause(const Accepted& one) const {
   if (cause.order && !parameters.empty()) cause.order = parameters.front().value;
   if (has_made_up_numbers(surrogates_, cause)) parameters.clear();
   const std::vector<Index> others =
-      all_but(columns_.cols(), places_of_source(problem_.model(), one.in_model));
+      all_but(all_columns_.columns().cols(), places_of_source(problem_.model(), one.in_model));
   const VectorXd effect = effect_of_source(problem_, one.in_model);
-  const Background rest(columns_(Eigen::all, others));
+  const Background rest = all_columns_.part(others);
   const double effect_rms = problem_.position_rms(rest.project(effect));
   const VectorXd without = folds_.held_out_residual(problem_.residual() + effect, others);
   const ErrorFigures before = figures_of(problem_.positions(without));
@@ -342,20 +363,13 @@ bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect,
                                  const std::vector<Index>& others) const {
   const std::vector<Index> own = places_of_source(problem_.model(), one.in_model);
   const VectorXd data = problem_.residual() + effect;
-  const Index block = std::max<Index>(1, problem_.poses() / kBlocksOfHalves);
-  for (const Index half : {0, 1}) {
-    std::vector<Index> rows;
-    for (Index i = 0; i < problem_.poses(); ++i) {
-      if ((i / block) % 2 != half) continue;
-      for (Index row = problem_.first_row(i); row < problem_.first_row(i + 1); ++row)
-        rows.push_back(row);
-    }
-    const Background rest(columns_(rows, others));
-    const MatrixXd C = columns_(rows, own);
+  for (const Half& half : halves_) {
+    const Background rest = half.columns.part(others);
+    const MatrixXd C = half.columns.columns()(Eigen::all, own);
     MatrixXd information = transposed_product(C, rest.project(C));
     information.diagonal().array() += 1;
     const VectorXd along =
-        inverse_factor_of(information) * (C.transpose() * rest.project(data(rows)));
+        inverse_factor_of(information) * (C.transpose() * rest.project(data(half.rows)));
     const double freedom = std::min<double>(one.best.freedom, static_cast<double>(own.size()));
     if (log_evidence(along.squaredNorm(), freedom) - one.penalty < limit_) return false;
   }
@@ -371,8 +385,7 @@ bool Findings::changes_size(const Accepted& one, const VectorXd& effect) const {
   VectorXd temperature = VectorXd::Zero(problem_.poses());
   for (Index i = 0; i < problem_.poses() && !surrogates_.temperature; ++i)
     temperature(i) = poses[static_cast<std::size_t>(i)].context.temperature.value_or(0);
-  const Background all(columns_);
-  const VectorXd left = all.project(problem_.residual());
+  const VectorXd left = all_columns_.project(problem_.residual());
   const auto evidence_of = [&](VectorXd course) {
     course.array() -= course.mean();
     if (!(course.norm() > 0)) return 0.0;
@@ -380,7 +393,7 @@ bool Findings::changes_size(const Accepted& one, const VectorXd& effect) const {
     for (Index i = 0; i < problem_.poses(); ++i)
       more.segment(problem_.first_row(i), problem_.row_count(i)) *=
           course(i) / course.cwiseAbs().maxCoeff();
-    const double own = more.dot(VectorXd(all.project(more)));
+    const double own = more.dot(VectorXd(all_columns_.project(more)));
     return own > 0 ? log_evidence(std::pow(more.dot(left), 2) / own, 1) : 0;
   };
   return std::max(evidence_of(time), evidence_of(temperature)) > thresholds::kChangesSize;

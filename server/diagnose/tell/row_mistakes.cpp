@@ -144,9 +144,8 @@ class Sides {
       if (std::find(own.begin(), own.end(), k) == own.end()) others.push_back(k);
     }
     marked_ = all.columns()(Eigen::all, own);
-    const MatrixXd rest = all.columns()(Eigen::all, others);
     data_ = problem.residual() + effect_of_source(problem, source);
-    const Background beside(rest);
+    const Background beside = all.part(others);
     for (int round = 0; round < kMostRounds; ++round) {
       fit(beside);
       if (!turn_sides()) break;

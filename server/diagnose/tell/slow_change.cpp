@@ -102,7 +102,7 @@ std::string said(const LinearProblem& problem, const Background& all, const Move
       if (std::find(mover.columns.begin(), mover.columns.end(), k) == mover.columns.end())
         others.push_back(k);
     }
-    const Background rest(all.columns()(Eigen::all, others));
+    const Background rest = all.part(others);
     const VectorXd always =
         problem.by_joint().col(mover.joint);  // per rad: nothing is expected of its size
     const VectorXd& data = problem.residual();
