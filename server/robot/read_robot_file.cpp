@@ -101,10 +101,26 @@ void read_motion(const YamlMap& map, Joint& joint) {
 }
 
 Joint read_joint(const YamlMap& map) {
-  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg",
-            "limits_mm", "sign", "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm",
-            "max_speed_deg_s", "max_speed_mm_s", "passive", "encoder_resolution_deg",
-            "encoder_resolution_mm", "pulses_per_deg"});
+  map.only({"type",
+            "theta_deg",
+            "d_mm",
+            "a_mm",
+            "alpha_deg",
+            "beta_deg",
+            "hayati",
+            "limits_deg",
+            "limits_mm",
+            "sign",
+            "gear_ratio",
+            "compliance_rad_per_nmm",
+            "mass_kg",
+            "cog_mm",
+            "max_speed_deg_s",
+            "max_speed_mm_s",
+            "passive",
+            "encoder_resolution_deg",
+            "encoder_resolution_mm",
+            "pulses_per_deg"});
   Joint joint;
   map.attempt([&] {
     const std::string type = map.text("type", "revolute");

@@ -234,9 +234,10 @@ TEST(UrScript, AThreadMaySetItsToolAtAnyTime) {
 
 TEST(UrScript, AThreadUsesTheToolThatIsSetBeforeItIsStarted) {
   const auto with = [](const std::string& before, const std::string& behind) {
-    return script("def drill():\n  thread work():\n    movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
-                  "    movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0], a=1.2, v=0.1)\n  end\n" +
-                  before + "  run work()\n" + behind + "  sleep(9)\nend\n");
+    return script(
+        "def drill():\n  thread work():\n    movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
+        "    movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0], a=1.2, v=0.1)\n  end\n" +
+        before + "  run work()\n" + behind + "  sleep(9)\nend\n");
   };
   const std::string hole = "p[1.8, -0.25, 0.8, 0, 1.0472, 0]";
   const test::Corrected set = with(kTcp, "");

@@ -136,8 +136,7 @@ TEST_F(ControllerFiles, AJobInPulsesIsCorrectedWhereTheRobotFileTellsThePulsesOf
   // One joint alone tells nothing of the others.
   std::string one = plain.robot_yaml;
   one.insert(one.find(joint, one.find("joints:")) + joint.size(), pulses);
-  EXPECT_NE(sentence(parse_robot(one, "robot").error()).find("pulses_per_deg"),
-            std::string::npos);
+  EXPECT_NE(sentence(parse_robot(one, "robot").error()).find("pulses_per_deg"), std::string::npos);
 }
 
 TEST_F(ControllerFiles, AControllersOwnListIsTakenAsFrames) {

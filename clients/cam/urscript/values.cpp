@@ -236,11 +236,11 @@ Told<Pose> Values::between(const Value& call, int depth, bool stored) const {
   const double share = value_in(number->numbers[0]);
   const Eigen::AngleAxisd turn(Matrix3(from->linear().transpose() * to->linear()));
   if (turn.angle() > kLargestTurn)
-    return because(fmt::format("{} turns by half a turn, which may go either way",
-                               shown(call.name)));
+    return because(
+        fmt::format("{} turns by half a turn, which may go either way", shown(call.name)));
   const Matrix3 part = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
-  return make_pose(from->linear() * part, from->translation() +
-                                              share * (to->translation() - from->translation()));
+  return make_pose(from->linear() * part,
+                   from->translation() + share * (to->translation() - from->translation()));
 }
 
 }  // namespace trammel::cam::urscript
