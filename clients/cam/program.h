@@ -137,11 +137,12 @@ enum class ArmNumber {
   kAxis1ToAxis2,
   kAxis2ToAxis3,
   kAxis3ToWrist,
-  kWristToFlange
+  kWristToFlange,
+  kTiltOfFlange
 };
 struct StatedNumber {
   ArmNumber of = ArmNumber::kAxes;
-  double value = 0;  ///< m; of kAxes their number
+  double value = 0;  ///< m; of kAxes their number, of kTiltOfFlange rad
   std::string name;  ///< `$LENGTH_A`
   std::string file;
   int line = 0;

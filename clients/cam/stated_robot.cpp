@@ -19,6 +19,7 @@ namespace trammel::cam {
 namespace {
 
 constexpr double kSameLength = 1e-4;  // m: both lengths come from the drawing
+constexpr double kSameAngle = 1e-4;   // rad
 constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
 constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
 constexpr double kSameUp = 0.09;      // rad: 5 deg
@@ -67,6 +68,8 @@ std::optional<double> number_of(ArmNumber number, const Chain& robot) {
       return std::hypot(link(2).a, link(3).d);
     case ArmNumber::kWristToFlange:
       return std::abs(link(5).d);
+    case ArmNumber::kTiltOfFlange:
+      return std::abs(std::remainder(link(5).alpha, 2 * kPi));
     case ArmNumber::kAxes:
       break;
   }
@@ -85,6 +88,8 @@ const char* words_for(ArmNumber number) {
       return "from axis 3 to the wrist";
     case ArmNumber::kWristToFlange:
       return "from the wrist to the flange";
+    case ArmNumber::kTiltOfFlange:
+      return "from the last axis to that of the flange";
     case ArmNumber::kAxes:
       break;
   }
@@ -105,15 +110,18 @@ std::optional<Error> contradiction(const StatedNumber& stated, const Chain& robo
         .next("correct with the model of the robot that this controller moves")
         .value();
   }
+  const bool turns = stated.of == ArmNumber::kTiltOfFlange;
   const double apart = std::abs(std::abs(stated.value) - std::abs(*ours));
-  if (apart <= kSameLength) return std::nullopt;
-  return refused("{} says {:.3f} mm {}, the robot file of {} has {:.3f} mm: {:.3f} mm apart",
-                 stated.name, to_mm(stated.value), words_for(stated.of), shown(robot.name()),
-                 to_mm(*ours), to_mm(apart))
+  if (apart <= (turns ? kSameAngle : kSameLength)) return std::nullopt;
+  const auto told = [&](double value) { return turns ? to_deg(value) : to_mm(value); };
+  const char* unit = turns ? "deg" : "mm";
+  return refused("{} says {:.3f} {} {}, the robot file of {} has {:.3f} {}: {:.3f} {} apart",
+                 stated.name, told(stated.value), unit, words_for(stated.of), shown(robot.name()),
+                 told(*ours), unit, told(apart), unit)
       .in(stated.file)
       .at_row(stated.line)
       .of(stated.name)
-      .beyond(to_mm(stated.value), to_mm(*ours))
+      .beyond(told(stated.value), told(*ours))
       .next("correct with the model of the robot that this controller moves")
       .value();
 }

@@ -166,6 +166,8 @@ TEST(StatedRobot, LengthsOfTheFolderThatAreNotThoseOfTheRobotFileAreRefused) {
   for (const auto& [was, is, told] : std::vector<std::array<std::string, 3>>{
            {"Z 200.0,A 0.0,B 0.0", "Z 225.0,A 0.0,B 0.0",
             "$TFLWP says 225.000 mm from the wrist to the flange"},
+           {"Z 200.0,A 0.0,B 0.0,C 0.0", "Z 200.0,A 0.0,B 0.0,C 90.0",
+            "$TFLWP says 90.000 deg from the last axis to that of the flange"},
            {"Z 780.0", "Z 650.0", "$TIRORO says 650.000 mm from the base up to axis 2"},
            {"=320.000", "=330.5", "$LENGTH_A says 330.500 mm from axis 1 to axis 2"},
            {"=1280.00", "=1150.00", "$LENGTH_B says 1150.000 mm from axis 2 to axis 3"},
@@ -181,13 +183,14 @@ TEST(StatedRobot, LengthsOfTheFolderThatAreNotThoseOfTheRobotFileAreRefused) {
 }
 
 TEST(StatedRobot, ATypeOfAnotherRobotIsRefused) {
-  const auto named = [](const std::string& robot, const std::string& type) {
+  const auto named = [](const std::string& robot, const std::string& type,
+                        const std::string& variable = "$TRAFONAME") {
     const Cell cell = *test::small_cell("cam");
     std::vector<Joint> joints;
     for (int j = 0; j < cell.robot.size(); ++j) joints.push_back(cell.robot.joint(j));
     const Program program =
         read_program(Dialect::kKrl,
-                     {{"$machine.dat", machine("$TRAFONAME[]=\"" + type + "\"\n")},
+                     {{"$machine.dat", machine(variable + "[]=\"" + type + "\"\n")},
                       {"$config.dat", kConfig},
                       {"p.src", src("$BASE=$WORLD\nLIN {X 1800,Y 0,Z 1000,A 0,B 60,C 0}\n")}},
                      {});
@@ -205,6 +208,8 @@ TEST(StatedRobot, ATypeOfAnotherRobotIsRefused) {
         has(named(other, type),
             "$TRAFONAME says #KR210R2700 EXTRA C4 FLR, the robot file is of " + std::string(other)))
         << named(other, type);
+    EXPECT_TRUE(has(named(other, type, "$MODEL_NAME"), "$MODEL_NAME says #KR210R2700 EXTRA C4 FLR"))
+        << named(other, type, "$MODEL_NAME");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/base/units.h"
 
@@ -75,25 +76,35 @@ class Stated {
       const bool said = X && !X->translation().isZero();
       return said ? std::optional<double>(X->translation().norm()) : std::nullopt;
     };
+    // How the flange turns about the last axis is the zero of that axis.
+    const auto tilt = [&](const Assigned& at, const Value&) -> std::optional<double> {
+      const Told<Pose> X = names_.frame_of(at.operands, at.file);
+      return X ? std::optional<double>(std::acos(std::clamp(X->linear()(2, 2), -1.0, 1.0)))
+               : std::nullopt;
+    };
     add(ArmNumber::kAxes, "$NUM_AX", count);
     add(ArmNumber::kHeightOfAxis2, "$TIRORO", along);
     add(ArmNumber::kAxis1ToAxis2, "$LENGTH_A", length);
     add(ArmNumber::kAxis2ToAxis3, "$LENGTH_B", length);
     add(ArmNumber::kAxis3ToWrist, "$TX3P3", along);
     add(ArmNumber::kWristToFlange, "$TFLWP", along);
+    add(ArmNumber::kTiltOfFlange, "$TFLWP", tilt);
   }
 
-  /// `$TRAFONAME[]="#KR210R2700 EXTRA C4 FLR"`, `DECL EX_KIN $EX_KIN={ET1 #ERSYS,...}`
+  /// `$TRAFONAME[]="#KR210R2700 EXTRA C4 FLR"`, the same as `$MODEL_NAME[]`, `DECL EX_KIN
+  /// $EX_KIN={ET1 #ERSYS,...}`
   void note_robot(std::size_t f, std::size_t k) {
     const Tokens& tokens = lines_[f][k].tokens;
     if (tokens.has("$EX_KIN") && tokens.has("ERSYS")) on_rail_ = names_.place(f, k);
     const Token name = tokens.back();
-    if (tokens.size() < 3 || !tokens[0].is("$TRAFONAME") || !name.is_text() || name.text[0] != '"')
-      return;
+    const bool says = tokens.size() >= 3 &&
+                      (tokens[0].is("$TRAFONAME") || tokens[0].is("$MODEL_NAME")) &&
+                      name.is_text() && name.text[0] == '"';
+    if (!says) return;
     const SourceFile& file = program_.files[f];
     program_.types.push_back(
         {file.text.substr(name.begin + 1, std::max<std::size_t>(name.text.size(), 2) - 2),
-         "$TRAFONAME", file.name, lines_[f][k].number});
+         std::string(tokens[0].text), file.name, lines_[f][k].number});
   }
 
   [[nodiscard]] int line_at(const Assigned& at) const { return lines_[at.file][at.line].number; }
