@@ -257,6 +257,22 @@ void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& no
       notes.push_back({"base_turn_untold", Severity::kStop, one.sentence});
 }
 
+/// About one point with a base that is told, the tool, the zeros of the last joints and the lengths
+/// pass for each other. An arm that was identified there is wrong elsewhere.
+void add_one_place(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  const auto& sources = parts.physics.sources;
+  const bool is_of_arm = std::any_of(sources.begin(), sources.end(), [](const auto& source) {
+    return source->cause().part == causes::Part::kLinks;
+  });
+  if (!parts.measured || !parts.measured->one_place || !parts.provenance.refits.empty()) return;
+  if (!parts.physics.cell->X_WB || !is_of_arm) return;
+  notes.push_back(
+      {"one_place", Severity::kStop,
+       "every tool was measured at one place: tool, zeros of the last joints and lengths cannot be "
+       "told apart there, so an error of one may stand under the name of another, and poses "
+       "elsewhere may be far off; measure poses all over the workspace and train again"});
+}
+
 void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
   for (const CellDoubt& doubt : doubts_of(cell))
     notes.push_back({doubt.code, Severity::kWarning, doubt.text});
@@ -395,6 +411,7 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
           rows_that_do_not_fit(model.parts().suspects, model.parts().provenance.training_poses))
     notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
+  add_one_place(model.parts(), notes);
   add_sides(model.parts(), notes);
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);

@@ -324,7 +324,8 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   const std::optional<WhatWasMeasured>& measured = parts().measured;
   if (measured) domain.margin = measured->range_margin();
   prediction.in_domain = trained_with && domain.in_range(context.q) &&
-                         (!measured || measured->is_near(cell().robot, context.q));
+                         (!measured || (measured->is_near(cell().robot, context.q) &&
+                                        measured->is_side_measured(context)));
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
 
   Matrix3 covariance;

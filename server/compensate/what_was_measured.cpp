@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "server/base/units.h"
+#include "server/measurement/one_place.h"
 #include "server/measurement/pose_groups.h"
 #include "server/robot/cell_papers.h"
 
@@ -196,6 +197,17 @@ bool WhatWasMeasured::is_near(const Chain& robot, const JointVector& q) const {
   return inside && nearest(flange_B, place) <= *reach;
 }
 
+bool WhatWasMeasured::is_side_measured(const PoseContext& context) const {
+  const std::size_t said = std::min(approaches.size(), context.direction.size());
+  for (std::size_t j = 0; j < said; ++j) {
+    const Side side = side_of(approaches[j]);
+    if ((side == Side::kBelow && context.direction[j] < 0) ||
+        (side == Side::kAbove && context.direction[j] > 0))
+      return false;
+  }
+  return true;
+}
+
 double WhatWasMeasured::range_margin() const {
   const double places = std::max(1.0, static_cast<double>(flange_B.cols()));
   return std::min(kMostMargin, kUsualMargin + kMarginOfFew / (places * places));
@@ -222,6 +234,7 @@ WhatWasMeasured what_was_measured(const PhysicalModel& physics, const Measuremen
     measured.flange_B.col(static_cast<Eigen::Index>(k)) =
         physics.cell->robot.flange_pose(q).translation();
   }
+  measured.one_place = is_each_tool_at_one_place(batch);
   add_reach(measured);
   if (measured.reach)
     measured.volume =

@@ -46,11 +46,15 @@ struct WhatWasMeasured {
   /// The doubt of the robot file by the same rows, in words, if the model identifies no geometry
   /// that would show it. A bias learns a wrong length as it learns everything else.
   std::optional<std::string> off_drawing;
+  bool one_place = false;  ///< of each tool: is_each_tool_at_one_place()
   static constexpr int kDirections = 16;
 
   /// True if the nominal flange at `q` is within reach of a place where it was measured, and inside
   /// their outline.
   [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
+  /// False if a joint came to nearly all poses from one side, and `context` says the other one.
+  /// The play of its gear was not measured, so it may be there.
+  [[nodiscard]] bool is_side_measured(const PoseContext& context) const;
   /// The share of a joint's range by which other poses of the same kind exceed these: a twentieth,
   /// more if they are few.
   [[nodiscard]] double range_margin() const;

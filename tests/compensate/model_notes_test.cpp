@@ -221,6 +221,26 @@ TEST(ModelNotes, ABaseWhoseTurnThePosesDoNotTellWaitsForAPerson) {
   EXPECT_EQ(stop->code, "base_turn_untold");
 }
 
+TEST(ModelNotes, AnArmThatWasMeasuredAtOnePlaceWaitsForAPersonWithABaseThatIsToldToo) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  MeasurementBatch batch;
+  for (int i = 0; i < 30; ++i) {
+    Measurement m;
+    m.context.q = JointVector::Constant(parts.physics.cell->robot.size(), 0.02 * i);
+    m.context.tool = parts.physics.cell->tools.begin()->first;
+    m.p_W = Vector3(0.6, 0.15, 0.5 + 1e-5 * i);
+    batch.measurements.push_back(m);
+  }
+  parts.measured = what_was_measured(parts.physics, batch);
+  const auto stop = stop_of(test::demand(CompensatedModel::make(parts)));
+  ASSERT_TRUE(stop);
+  EXPECT_EQ(stop->code, "one_place");
+  for (std::size_t i = 0; i < 30; ++i)
+    batch.measurements[i].p_W.x() += 0.02 * static_cast<double>(i);
+  parts.measured = what_was_measured(parts.physics, batch);
+  EXPECT_FALSE(stop_of(test::demand(CompensatedModel::make(parts)))) << "all over the workspace";
+}
+
 std::optional<Note> note_of(const CompensatedModel::Parts& parts, const std::string& code) {
   for (Note& note : notes_of(test::demand(CompensatedModel::make(parts))))
     if (note.code == code) return std::move(note);

@@ -77,11 +77,11 @@ TEST(WhatWasMeasured, APromiseFromOneSideOfPlayIsSaidToBeOfThatSideAndWouldBeWro
       trained(cell, as_measured(robot, from_one_side(plan.poses, -1), 1));
   EXPECT_EQ(one_sided(model.parts().measured), "from above");
   EXPECT_TRUE(has_note(model, kOneSide));
-  const double same =
-      model.evaluate(as_measured(robot, from_one_side(fresh.poses, -1), 3)).compensated.rms;
-  const double other =
-      model.evaluate(as_measured(robot, from_one_side(fresh.poses, 1), 3)).compensated.rms;
-  EXPECT_GT(other, 4 * same);
+  const Evaluation same = model.evaluate(as_measured(robot, from_one_side(fresh.poses, -1), 3));
+  const Evaluation other = model.evaluate(as_measured(robot, from_one_side(fresh.poses, 1), 3));
+  EXPECT_GT(other.compensated.rms, 4 * same.compensated.rms);
+  EXPECT_GT(same.in_domain, 20);
+  EXPECT_EQ(other.in_domain, 0) << "that side was never measured";
 }
 
 TEST(WhatWasMeasured, APlanMeasuresBothSidesSoThatThePromiseCountsThePlay) {

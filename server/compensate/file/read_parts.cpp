@@ -269,6 +269,7 @@ WhatWasMeasured measured_from(const Json& json) {
     measured.joint_rounding = {number_from(rounding, "step_rad"),
                                number_from(rounding, "stddev_m")};
   }
+  measured.one_place = json.contains("one_place") && truth_from(json.at("one_place"));
   if (json.contains("off_drawing")) measured.off_drawing = json.at("off_drawing");
   if (!json.contains("temperature_c")) return measured;
   const Json& temperature = json.at("temperature_c");

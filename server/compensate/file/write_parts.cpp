@@ -246,6 +246,7 @@ Json json_of(const WhatWasMeasured& measured) {
   if (measured.joint_rounding)
     json["joint_rounding"] = {{"step_rad", measured.joint_rounding->step},
                               {"stddev_m", measured.joint_rounding->stddev}};
+  if (measured.one_place) json["one_place"] = true;
   if (measured.off_drawing) json["off_drawing"] = *measured.off_drawing;
   return json;
 }
