@@ -208,6 +208,24 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell,
   return result;
 }
 
+/// True if `others` are off by much the same, as seen from the instrument or from the tool: a load
+/// or a tool that nobody recorded shifts rows like that, and no mistake of single rows does.
+bool are_off_alike(const CalibrationResult& found, const MeasurementBatch& others) {
+  constexpr double kAlike = 0.5;  // of their rms: the mean of rows that err by themselves is less
+  const MeasurementBatch here = aligned(others, found.sessions, found.model.cell->tracker);
+  Vector3 mean_W = Vector3::Zero(), mean_T = Vector3::Zero();
+  double square = 0;
+  for (const Measurement& m : here.measurements) {
+    const Pose X_WT = found.model.pose_W(m.context, found.model.values, nullptr);
+    const Vector3 off = m.p_W - X_WT.translation();
+    mean_W += off;
+    mean_T += X_WT.linear().transpose() * off;
+    square += off.squaredNorm();
+  }
+  const auto n = static_cast<double>(here.measurements.size());
+  return std::max(mean_W.norm(), mean_T.norm()) / n > kAlike * std::sqrt(square / n);
+}
+
 /// Removes the rows that fit no arm on which the others agree, as a training does, and lists them
 /// as suspects. Returns true if there are any. `plain`: the calibration on all rows, or why there
 /// is none.
@@ -218,7 +236,7 @@ bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed,
   std::optional<Agreement> agreement = agreement_of(cell, sources, prepared.train, plain);
   if (!agreement) return false;
   Result<CalibrationResult> found = calibrate(cell, sources, agreement->agreeing, {});
-  if (!found) return false;
+  if (!found || (plain && are_off_alike(*found, agreement->others))) return false;
   add_suspects(agreement->others, *found);
   const auto& agreeing = agreement->agreeing.measurements;
   for (const SuspectPose& one : found->suspects) {
