@@ -49,7 +49,8 @@ void JsonReader::refuse(const char* name, const std::string& expected) {
 
 void JsonReader::only(std::initializer_list<const char*> names) {
   if (!object_.is_object()) return refuse("", "an object");
-  for (const auto& [name, value] : object_.items()) {
+  for (const auto& member : object_.items()) {
+    const std::string& name = member.key();
     const bool known = std::any_of(names.begin(), names.end(),
                                    [&](const char* one) { return std::string_view(one) == name; });
     if (!known) refuse(name.c_str(), fmt::format("one of {}", fmt::join(names, ", ")));

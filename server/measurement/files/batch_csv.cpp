@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
