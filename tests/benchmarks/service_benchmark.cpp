@@ -235,7 +235,8 @@ void tell(const std::string& what, const Times& times) {
 void overhead(bool quick) {
   for (const ModelSpec& spec : kModels) {
     const CompensatedModel model = model_of(spec, quick ? 300 : 1200);
-    const auto [tool, payload] = *model.parts().trained_with.begin();
+    const auto& [used_tool, used_payload] = *model.parts().trained_with.begin();
+    const std::string tool = used_tool, payload = used_payload;
     Bench bench(model);
     for (const std::size_t items : {std::size_t{1}, std::size_t{10000}}) {
       const auto joints = test::virtual_joints(static_cast<int>(items), 5);

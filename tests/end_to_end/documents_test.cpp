@@ -204,7 +204,8 @@ TEST(Documents, WhatEveryOtherDocumentHasSomebodyTypeRuns) {
 }
 
 TEST(Documents, EveryReasonNotToTypeALineIsNeeded) {
-  for (const auto& [beginning, why] : not_typed()) {
+  for (const auto& reason : not_typed()) {
+    const std::string beginning(reason.first);
     int lines = 0;
     for (const std::string& document : documents()) {
       for (const Block& block : blocks_of(document))
