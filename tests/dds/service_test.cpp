@@ -557,7 +557,8 @@ TEST_F(ServiceTest, ALongCorrectionDoesNotHoldUpAPrediction) {
   });
   int meanwhile = 0;
   while (!corrected && meanwhile < 20) {
-    ASSERT_TRUE(session->predict_error(kCell7, {kJoints}));
+    const auto told = session->predict_error(kCell7, {kJoints});
+    ASSERT_TRUE(told) << "prediction " << meanwhile << ": " << told.error().message;
     ++meanwhile;
   }
   EXPECT_EQ(meanwhile, 20);
