@@ -14,6 +14,7 @@
 #include "clients/cam/free_turns.h"
 #include "clients/cam/nominal_targets.h"
 #include "clients/cam/path_check.h"
+#include "clients/cam/short_names.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/exchange/si.h"
@@ -44,8 +45,7 @@ Status check_marks(const Program& program) {
   for (const SourceFile& file : program.files) {
     const auto mark = find_mark(file.text);
     if (!mark) continue;
-    return refused("it is corrected already, by model {} on {}", shown_short(mark->model),
-                   shown_short(mark->date))
+    return refused("{}", mark_text(*mark))
         .in(file.name)
         .next("correct the original, or --again takes the one that is kept beside it");
   }
@@ -67,6 +67,7 @@ class Correcting {
         rows_(program.targets.size()),
         moves_to_(program.targets.size()) {
     result_.notes = nominal_.notes;
+    result_.contradictions = nominal_.contradictions;
     for (const ProgramMove& move : program_.moves) {
       for (const std::size_t t : move.targets) {
         if (options_.lead_in) moves_to_[t].push_back(&move);
@@ -388,6 +389,7 @@ class Correcting {
     // Rows are large, and most rows of a long program are already in their places.
     if (!std::is_sorted(result_.rows.begin(), result_.rows.end(), by_place))
       std::stable_sort(result_.rows.begin(), result_.rows.end(), by_place);
+    shorten_names(result_.rows);
     write_counts();
     for (std::size_t f = 0; f < program_.files.size(); ++f) write_file(f);
     return std::move(result_);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "server/base/hash.h"
+#include "server/base/plain_text.h"
 
 namespace trammel::cam {
 
@@ -31,6 +32,11 @@ std::string short_hash(std::string_view bytes) { return sha256_hex(bytes).substr
 std::vector<std::string> words_of(const Mark& mark) {
   return {"TRAMMEL model=" + mark.model, "version=" + mark.version, "date=" + mark.date,
           "original=" + mark.original};
+}
+
+std::string mark_text(const Mark& mark) {
+  return fmt::format("it is corrected already, by model {} on {}", shown_short(mark.model),
+                     shown_short(mark.date));
 }
 
 std::optional<Mark> find_mark(std::string_view text) {

@@ -18,6 +18,8 @@ struct Mark {
 [[nodiscard]] std::string short_hash(std::string_view bytes);
 /// The words of a mark, in their order in comments.
 [[nodiscard]] std::vector<std::string> words_of(const Mark& mark);
+/// `it is corrected already, by model 1a2b3c on 2026-01-07`
+[[nodiscard]] std::string mark_text(const Mark& mark);
 /// The mark of a text in any dialect; empty where there is none.
 [[nodiscard]] std::optional<Mark> find_mark(std::string_view text);
 

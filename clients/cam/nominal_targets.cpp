@@ -53,6 +53,7 @@ class Finding {
 
  private:
   void note_tools() {
+    found_.contradictions = contradictions_of(program_, arm_.robot(), cell_);
     found_.notes = program_.notes;
     for (const std::string& note : notes_on_base(program_, cell_)) found_.notes.push_back(note);
     if (const std::string note = note_on_taught_targets(program_); !note.empty())

@@ -23,6 +23,7 @@ struct NominalTargets {
   std::vector<ToolChoice> tools;       ///< of each tool of the program
   std::vector<NominalTarget> targets;  ///< of each target of the program
   std::vector<std::string> notes;
+  std::vector<std::string> contradictions = {};  ///< as contradictions_of() has them
 };
 
 /// The choice of the tool if motions command axes, and no pose depends on the tool.

@@ -6,7 +6,10 @@
 #include <tuple>
 
 #include "clients/cam/configuration.h"
+#include "clients/cam/mark.h"
 #include "clients/cam/nominal_targets.h"
+#include "clients/cam/short_names.h"
+#include "server/base/plain_text.h"
 #include "server/exchange/si.h"
 
 namespace trammel::cam {
@@ -62,6 +65,14 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
       TRY(nominal_targets(program, arm, cell, tool, payload, BareTools::kOfTheCell));
   PredictedProgram result;
   result.notes = nominal.notes;
+  result.contradictions = nominal.contradictions;
+  for (const SourceFile& file : program.files) {
+    if (const auto mark = find_mark(file.text))
+      result.corrected.push_back(fmt::format(
+          "{}: {}. The error is that of the numbers in it, which are moved on purpose: the error "
+          "that is left where the tool is wanted is in the receipt of the correction",
+          shown(file.name), mark_text(*mark)));
+  }
   for (std::size_t t = 0; t < program.targets.size(); ++t) {
     result.targets.push_back(begun(program, t));
     result.targets[t].message = nominal.targets[t].why_not;
@@ -98,6 +109,7 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
                    [](const PredictedTarget& a, const PredictedTarget& b) {
                      return std::tie(a.file, a.line) < std::tie(b.file, b.line);
                    });
+  shorten_names(result.targets);
   return result;
 }
 

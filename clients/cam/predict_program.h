@@ -22,6 +22,7 @@ struct PredictedTarget {
   std::string name, file, motion, tool, frame;
   int line = 0;
   std::vector<int> used_at;
+  std::string shown = {};  ///< its name for people and tables, see shown_name()
   std::string
       status;  ///< `ok`, `out_of_domain`, `joint_limit`, or `refused` where nothing can be said
   std::string message;                         ///< why not ok
@@ -32,7 +33,9 @@ struct PredictedTarget {
 struct PredictedProgram {
   std::string model_id;
   exchange::ModelInfo model;
-  std::vector<PredictedTarget> targets;  ///< by file and line
+  std::vector<PredictedTarget> targets;     ///< by file and line
+  std::vector<std::string> contradictions;  ///< of the controller's files and the robot file
+  std::vector<std::string> corrected;  ///< files that are marked as corrected, one sentence each
   std::vector<std::string> notes;
 };
 

@@ -191,10 +191,12 @@ void leave_targets_in(Program& program, const std::set<std::string>& files) {
       unused.insert(file);
       continue;
     }
-    program.left.push_back(
-        {target.name, target.file, target.line, target.motion,
-         "it stands in a system file of the controller, which a run over a folder leaves as it is; "
-         "hand that file over by its name to have it corrected"});
+    const bool home = program.dialect == "krl" && is_joints(target.coordinates);
+    program.left.push_back({target.name, target.file, target.line, target.motion,
+                            fmt::format("it {} a system file of the controller, which a run over a "
+                                        "folder leaves as it is; hand that file over by its name "
+                                        "to have it corrected",
+                                        home ? "is a home position, joints in" : "stands in")});
   }
   if (std::find(leave.begin(), leave.end(), true) == leave.end()) return;
   for (ProgramMove& move : program.moves)

@@ -165,6 +165,16 @@ struct StatedCoupling {
   int line = 0;
 };
 
+/// The end of an axis' range as the controller's files state it.
+struct StatedLimit {
+  int axis = 0;  ///< of the turning ones, from 0
+  bool upper = false;
+  double value = 0;  ///< rad
+  std::string name;  ///< `$SOFTP_END[3]`
+  std::string file;
+  int line = 0;
+};
+
 /// A target that may be corrected.
 struct ProgramTarget {
   std::string name;          ///< `p10`, or how it is computed: `Offs(p10,0,0,50)`
@@ -263,6 +273,7 @@ struct StatedRobot {
   std::vector<StatedNumber> numbers;
   std::vector<StatedType> types;
   std::vector<StatedCoupling> couplings;
+  std::vector<StatedLimit> limits;
   std::vector<StatedUp> ups;
 };
 

@@ -18,6 +18,7 @@ struct ReceiptRow {
   std::string name, file, motion, tool, frame;
   int line = 0;
   std::vector<int> used_at;
+  std::string shown = {};  ///< its name for people and tables, see shown_name()
   std::string status;  ///< `ok`, `out_of_domain`, ...; `refused` if the program does not determine
                        ///< it
   std::string message, suggestion;
@@ -58,6 +59,7 @@ struct CorrectedProgram {
   std::vector<bool> changed;      ///< of each file
   std::vector<ReceiptRow> rows;   ///< by file and line
   std::vector<InsertedLine> inserted;
+  std::vector<std::string> contradictions;  ///< of the controller's files and the robot file
   std::vector<std::string> notes;
   std::size_t moves = 0, moves_corrected = 0;
   std::size_t lead_ins = 0;  ///< motions that were inserted, of all rows

@@ -23,6 +23,7 @@ constexpr double kSameAngle = 1e-4;   // rad
 constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
 constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
 constexpr double kSameUp = 0.09;      // rad: 5 deg
+constexpr double kSameLimit = 9e-4;   // rad: 0.05 deg
 
 double angle_between(const Vector3& a, const Vector3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -32,6 +33,9 @@ std::string direction_text(const Vector3& direction) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x() + 0.0, direction.y() + 0.0,
                      direction.z() + 0.0);
 }
+
+/// deg, as people write the end of an axis.
+double rounded(double degrees) { return std::round(degrees * 1e3) / 1e3; }
 
 std::string place_of(const StatedBase& base) {
   return base.line == 0 ? fmt::format("{} of {}", base.name, base.file)
@@ -252,6 +256,55 @@ std::optional<Error> contradiction(const StatedCoupling& stated, const Chain& ro
       .value();
 }
 
+/// `on the floor`, `upside down`, `on a wall`, as people call how a robot is mounted.
+const char* mounting(const Vector3& up_B) {
+  constexpr double kUpright = 0.7;
+  return up_B.z() > kUpright ? "standing" : up_B.z() < -kUpright ? "hanging" : "on a wall";
+}
+
+/// The base of the controller's files, turned against the vertical otherwise than the cell's.
+std::vector<std::string> against_mounting(const StatedRobot& stated, const CellTools& cell) {
+  if (stated.bases.empty() || !cell.gravity_B) return {};
+  const StatedBase& base = stated.bases.front();
+  const Vector3 by_files = base.X_WB.linear().transpose() * Vector3::UnitZ(),
+                by_cell = -*cell.gravity_B;
+  const double tilted = angle_between(by_files, by_cell);
+  if (tilted <= kSameUp) return {};
+  return {fmt::format(
+      "by {} the robot is {}, up is {} in its base; by the cell's base and gravity it is {}, up is "
+      "{}: {:.0f} deg apart. Gravity bends an arm otherwise that is mounted otherwise: see that "
+      "the model is of this robot",
+      place_of(base), mounting(by_files), direction_text(by_files), mounting(by_cell),
+      direction_text(by_cell), to_deg(tilted))};
+}
+
+/// The ends of axes that are not those of the robot file; empty: none is.
+std::string against_limits(const StatedRobot& stated, const Chain& robot) {
+  std::vector<int> turning;
+  for (int j = 0; j < robot.size(); ++j)
+    if (robot.joint(j).type == JointType::kRevolute) turning.push_back(j);
+  std::vector<std::string> ends;
+  std::string file;
+  bool beyond = false;
+  for (const StatedLimit& limit : stated.limits) {
+    if (limit.axis >= static_cast<int>(turning.size())) continue;
+    const Joint& joint = robot.joint(turning[static_cast<std::size_t>(limit.axis)]);
+    const double ours = limit.upper ? joint.upper : joint.lower;
+    if (std::abs(limit.value - ours) <= kSameLimit) continue;
+    beyond |= limit.upper ? limit.value > ours : limit.value < ours;
+    file = limit.file;
+    ends.push_back(fmt::format("{} (line {}) {:g}, there {:g}", limit.name, limit.line,
+                               rounded(to_deg(limit.value)), rounded(to_deg(ours))));
+  }
+  if (ends.empty()) return "";
+  return fmt::format(
+      "ends of axes in {} are not those of the robot file of {}, deg: {}. {}", file,
+      shown(robot.name()), fmt::join(ends, "; "),
+      beyond ? "A controller that lets an axis go further than the drawing may be of another arm"
+             : "The controller stops short of the robot file: a target beyond its ends is run into "
+               "a limit");
+}
+
 /// KUKA's types say load and reach, KR 210 R2700. Words beside them are spelled in many ways.
 std::optional<Error> contradiction(const StatedType& stated, const Chain& robot) {
   const std::string theirs = upper(stated.type), ours = upper(robot.name());
@@ -302,6 +355,7 @@ void take_stated(const StatedRobot& stated, StatedRobot& all) {
   all.numbers.insert(all.numbers.end(), stated.numbers.begin(), stated.numbers.end());
   all.types.insert(all.types.end(), stated.types.begin(), stated.types.end());
   all.couplings.insert(all.couplings.end(), stated.couplings.begin(), stated.couplings.end());
+  all.limits.insert(all.limits.end(), stated.limits.begin(), stated.limits.end());
   all.ups.insert(all.ups.end(), stated.ups.begin(), stated.ups.end());
 }
 
@@ -358,6 +412,14 @@ Status check_gravity(const Program& program, const CellTools& cell) {
   return {};
 }
 
+std::vector<std::string> contradictions_of(const StatedRobot& stated, const Chain& robot,
+                                           const CellTools& cell) {
+  std::vector<std::string> sentences = against_mounting(stated, cell);
+  if (std::string limits = against_limits(stated, robot); !limits.empty())
+    sentences.push_back(std::move(limits));
+  return sentences;
+}
+
 std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell) {
   if (program.bases.empty() || same_place(program.bases.front().X_WB, Pose::Identity())) return {};
   const StatedBase& base = program.bases.front();
@@ -368,13 +430,6 @@ std::vector<std::string> notes_on_base(const Program& program, const CellTools& 
     stands += fmt::format("; the cell's base, {}, is seen from its measuring system",
                           pose_text(*cell.X_WB));
   std::vector<std::string> notes = {stands};
-  const Vector3 up_B = base.X_WB.linear().transpose() * Vector3::UnitZ();
-  const double tilted = cell.gravity_B ? angle_between(up_B, -*cell.gravity_B) : 0;
-  if (tilted > kSameUp)
-    notes.push_back(fmt::format(
-        "by {} up is {} in the robot's base, by the cell's base and gravity it is {}, {:.0f} deg "
-        "off: see that the model is of a robot that is mounted so",
-        place_of(base), direction_text(up_B), direction_text(-*cell.gravity_B), to_deg(tilted)));
   std::vector<std::string> rows;
   for (const ProgramFrame& frame : program.frames) {
     if (frame.in_base && !frame.row.empty()) rows.push_back(shown(frame.row));

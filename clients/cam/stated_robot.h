@@ -27,6 +27,12 @@ void stand_in_world(Program& program, const ReadOptions& options);
 /// Refuses a program whose stated mounting of the robot contradicts the cell's base and gravity.
 [[nodiscard]] Status check_gravity(const Program& program, const CellTools& cell);
 
+/// What the controller's files say of the robot otherwise than the robot file and the cell, and
+/// what does not forbid a correction by itself: the ends of its axes, and a base that is turned
+/// against the vertical. One sentence each, with both places and values.
+[[nodiscard]] std::vector<std::string> contradictions_of(const StatedRobot& stated,
+                                                         const Chain& robot, const CellTools& cell);
+
 /// The robot's assumed place, if it is not the origin of the controller's world; one sentence each.
 [[nodiscard]] std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell);
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "clients/cam/short_names.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
@@ -81,7 +82,7 @@ ordered_json json_mm(double value) {
 }
 
 ordered_json item_of(const ReceiptRow& row) {
-  ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
+  ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", shown_name(row)},
                        {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
                        {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
   if (!row.suggestion.empty()) item["suggestion"] = row.suggestion;
@@ -126,7 +127,7 @@ std::string receipt_csv(const CorrectedProgram& program) {
   const auto out = std::back_inserter(text);
   for (const ReceiptRow& row : program.rows) {
     fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line,
-                   csv_field(row.name), csv_field(row.motion),
+                   csv_field(shown_name(row)), csv_field(row.motion),
                    csv_field(fmt::format("{}", fmt::join(row.used_at, " "))), csv_field(row.tool),
                    csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
                    row.before.empty() ? "" : spelled(row.coordinates));
@@ -149,7 +150,10 @@ std::string receipt_csv(const CorrectedProgram& program) {
 
 std::string receipt_json(const CorrectedProgram& program, const ordered_json& tolerance,
                          const std::vector<Note>& of_model) {
-  std::vector<Note> notes = of_model;
+  std::vector<Note> notes;
+  for (const std::string& one : program.contradictions)
+    notes.push_back({"contradiction", Note::Severity::kWarning, one});
+  notes.insert(notes.end(), of_model.begin(), of_model.end());
   for (const std::string& one : program.notes)
     notes.push_back({"program", Note::Severity::kInfo, one});
   ordered_json inserted = ordered_json::array();
@@ -186,8 +190,10 @@ std::string receipt_json(const CorrectedProgram& program, const ordered_json& to
 std::string receipt_summary(const CorrectedProgram& program) {
   std::map<std::string, int> counts;
   for (const ReceiptRow& row : program.rows) ++counts[row.status];
-  std::string text = fmt::format("{} motions, {} to corrected targets; {} targets:", program.moves,
-                                 program.moves_corrected, program.rows.size());
+  std::string text;
+  for (const std::string& one : program.contradictions) text += "warning: " + one + "\n";
+  text += fmt::format("{} motions, {} to corrected targets; {} targets:", program.moves,
+                      program.moves_corrected, program.rows.size());
   const char* separator = " ";
   for (const auto& [status, count] : counts) {
     text += fmt::format("{}{} {}", separator, count, status);
@@ -203,7 +209,7 @@ std::string receipt_summary(const CorrectedProgram& program) {
     return row.corrected() && row.turned_deg != 0;
   });
   if (turned > 0) text += fmt::format("{} targets are turned about the tool's axis\n", turned);
-  for (const std::string& note : program.notes) text += "note: " + note + "\n";
+  for (const std::string& note : counted(program.notes)) text += "note: " + note + "\n";
   return text;
 }
 
@@ -247,8 +253,8 @@ std::string by_reason(const CorrectedProgram& program, std::size_t most_lines) {
         reasons[k].targets > 1 ? fmt::format(" and {} more", reasons[k].targets - 1) : "";
     text += fmt::format("  {} motion{}, {} {} line {}{}: {}\n", reasons[k].motions,
                         reasons[k].motions == 1 ? "" : "s",
-                        first.name.empty() ? first.motion : first.name, first.file, first.line,
-                        more, why_left(first));
+                        first.name.empty() ? first.motion : shown_name(first), first.file,
+                        first.line, more, why_left(first));
   }
   if (reasons.size() > most_lines)
     text += fmt::format("  and {} more reasons\n", reasons.size() - most_lines);
@@ -270,7 +276,7 @@ std::string left_alone_text(const CorrectedProgram& program) {
   for (const ReceiptRow& row : program.rows) {
     if (row.corrected()) continue;
     text += fmt::format("  {} line {}: {}{}\n", row.file, row.line,
-                        row.name.empty() ? "" : row.name + ": ", why_left(row));
+                        row.name.empty() ? "" : shown_name(row) + ": ", why_left(row));
   }
   return text;
 }

@@ -18,8 +18,8 @@ namespace trammel::cam {
 [[nodiscard]] std::string receipt_json(const CorrectedProgram& program,
                                        const nlohmann::ordered_json& tolerance = nullptr,
                                        const std::vector<Note>& of_model = {});
-/// `148 motions, 141 corrected; 60 targets: 55 ok, 5 refused`, and the items left alone with their
-/// reasons.
+/// What the files contradict, then `148 motions, 141 corrected; 60 targets: 55 ok, 5 refused`, and
+/// the items left alone with their reasons.
 [[nodiscard]] std::string receipt_summary(const CorrectedProgram& program);
 /// A line per target; beyond ten, a line per reason, the one with the most motions first.
 [[nodiscard]] std::string left_alone_text(const CorrectedProgram& program);

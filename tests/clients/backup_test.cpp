@@ -260,6 +260,39 @@ TEST_F(ImportBackup, OfAFanucToolsAndFramesComeFromItsSystemVariables) {
   EXPECT_TRUE(differing(file("cell.yaml")).empty());
 }
 
+/// As a controller of two groups writes it, with all that lies beside it in a full backup.
+TEST_F(ImportBackup, OfAWholeFanucBackupTheFramesComeFromItsSystemVariablesWhateverLiesBeside) {
+  clear_backup();
+  folder_.write(
+      "backup/SYSFRAME.VA",
+      "[*SYSTEM*]$MNUFRAME  Storage: SHADOW  Access: RW  : ARRAY[2,20] OF POSITION\r\n"
+      "    [1,1] =   'panel'  Group: 1   Config: N D B, 0, 0, 0\r\n"
+      "  X:  1800.000   Y:  -250.000   Z:   800.000\r\n"
+      "  W:      .000   P:      .000   R:      .000\r\n"
+      "    [1,2] =   ''  Uninitialized\r\n    [2,1] = \r\n  Group: 2\r\n"
+      "  X:  9999.000   Y:  -250.000   Z:   800.000\r\n"
+      "  W:      .000   P:      .000   R:      .000\r\n"
+      "[*SYSTEM*]$MNUFRAMENUM  Storage: SHADOW  Access: RW  : ARRAY[2] OF BYTE\r\n    [1] = 1\r\n"
+      "[*SYSTEM*]$MNUTOOL  Storage: SHADOW  Access: RW  : ARRAY[2,20] OF POSITION\r\n"
+      "    [1,2] = \r\n  Group: 1   Config: N D B, 0, 0, 0\r\n"
+      "  X:   100.000   Y:      .000   Z:   150.000\r\n"
+      "  W:      .000   P:   -45.000   R:      .000\r\n");
+  folder_.write("backup/FRAMEVAR.VA",
+                "[TPFDEF]SETUP_DATA  Storage: CMOS  Access: RW  : ARRAY[2,3,20] OF FRMSET_T\n"
+                "     Field: SETUP_DATA[1,1,2].$COMMENT Access: RW: STRING[29] = 'SPINDLE'\n");
+  for (const char* beside : {"HISTORY.DAT", "VISION.SUB", "ERRALL.LS", "SYSHOST.SV"})
+    folder_.write(std::string("backup/") + beside, "x\n");
+  const auto [code, said] = told(
+      {"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--frames", file("frames.csv")});
+  ASSERT_EQ(code, 0) << said;
+  const Cell cell = read_cell(file("cell.yaml")).value();
+  ASSERT_EQ(cell.tools.size(), 1u);
+  EXPECT_LT((cell.tools.at("UTOOL[2]")->translation() - Vector3(.1, 0, .15)).norm(), 1e-9);
+  EXPECT_NE(text("frames.csv").find("UFRAME[1],1800,-250,800,1,0,0,0"), std::string::npos)
+      << text("frames.csv");
+  EXPECT_EQ(text("frames.csv").find("UFRAME[2]"), std::string::npos) << "it was never set";
+}
+
 TEST_F(ImportBackup, OfAYaskawaToolsLoadsAndFramesComeFromItsConditionFiles) {
   std::filesystem::remove_all(file("backup"));
   std::filesystem::create_directories(file("backup"));
@@ -272,6 +305,30 @@ TEST_F(ImportBackup, OfAYaskawaToolsLoadsAndFramesComeFromItsConditionFiles) {
   const Cell cell = read_cell(file("cell.yaml")).value();
   ASSERT_TRUE(cell.tools.contains("TOOL[1]"));
   EXPECT_NEAR(cell.payloads.at("TOOL[1]").mass, 100, 1e-9);
+}
+
+TEST_F(ImportBackup, OfManyToolsWithoutALoadOneNoteTellsTheirNumber) {
+  clear_backup();
+  std::string tools;
+  for (int k = 0; k < 31; ++k)
+    tools += fmt::format(
+        "//TOOL {}\n///NAME \n{}.000,0.000,150.000,0.0000,0.0000,0.0000\n0.000,0.000,0.000\n"
+        "0.000\n0.000,0.000,0.000\n",
+        k, k + 1);
+  folder_.write("backup/TOOL.CND", tools);
+  ASSERT_EQ(
+      run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--json", file("j.json")}),
+      0);
+  std::vector<std::string> without;
+  const auto told_json = nlohmann::json::parse(text("j.json"));
+  for (const auto& note : told_json["notes"])
+    if (note.get<std::string>().find("no load") != std::string::npos)
+      without.push_back(note.get<std::string>());
+  ASSERT_EQ(without.size(), 1u);
+  EXPECT_EQ(
+      without[0].rfind("31 tools have no load there (TOOL[0], TOOL[10], TOOL[11] and 28 more)", 0),
+      0u)
+      << without[0];
 }
 
 TEST_F(ImportBackup, RefusesListsWithoutATool) {

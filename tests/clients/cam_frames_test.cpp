@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include "clients/programs/receipt_text.h"
 #include "tests/support/shifting_model.h"
 
 namespace trammel::cam {
@@ -210,6 +211,62 @@ TEST(StatedRobot, ATypeOfAnotherRobotIsRefused) {
         << named(other, type);
     EXPECT_TRUE(has(named(other, type, "$MODEL_NAME"), "$MODEL_NAME says #KR210R2700 EXTRA C4 FLR"))
         << named(other, type, "$MODEL_NAME");
+  }
+}
+
+TEST(StatedRobot, AxisEndsOfTheFolderThatAreNotTheRobotFilesLeadWithBothPlacesAndValues) {
+  const Chain robot = test::small_cell("cam")->robot;
+  const auto ends = [&](double more_of_axis_3) {
+    std::string lines;
+    for (int j = 0; j < robot.size(); ++j) {
+      const double more = j == 2 ? more_of_axis_3 : 0;
+      lines += fmt::format("$SOFTN_END[{0}]={1:.3f}\n$SOFTP_END[{0}]={2:.3f}\n", j + 1,
+                           to_deg(robot.joint(j).lower), to_deg(robot.joint(j).upper) + more);
+    }
+    return lines;
+  };
+  const std::string line = "$BASE=$WORLD\nLIN {X 1800.0,Y 0.0,Z 1000.0,A 0.0,B 60.0,C 0.0}\n";
+  EXPECT_TRUE(krl(line, ends(0)).program.contradictions.empty());
+  const std::string upper = fmt::format("{:g}", to_deg(robot.joint(2).upper));
+  for (const auto& [more, told] : {std::pair(7.0, "may be of another arm"),
+                                   std::pair(-7.0, "stops short of the robot file")}) {
+    const test::Corrected made = krl(line, ends(more));
+    ASSERT_EQ(made.program.contradictions.size(), 1u) << more << made.refusal;
+    const std::string said = made.program.contradictions[0];
+    for (const std::string& part :
+         {std::string("R1/Mada/$machine.dat"), std::string("$SOFTP_END[3] (line 8)"),
+          fmt::format("{:g}", to_deg(robot.joint(2).upper) + more), upper,
+          std::string("the robot file of ABB IRB 6640-205/2.75"), std::string(told)})
+      EXPECT_TRUE(has(said, part)) << part << ": " << said;
+    EXPECT_FALSE(has(said, "$SOFTP_END[2]")) << said;
+    EXPECT_EQ(receipt_summary(made.program).rfind("warning: ends of axes in", 0), 0u)
+        << receipt_summary(made.program);
+    EXPECT_TRUE(has(receipt_json(made.program), "\"contradiction\"")) << "for programs";
+  }
+}
+
+TEST(StatedRobot, AnArmThatHangsByTheFolderAndStandsByTheCellLeadsWithBoth) {
+  const std::string line = "$BASE=$ROBROOT\nLIN {X 1800.0,Y 0.0,Z 1000.0,A 0.0,B 60.0,C 0.0}\n";
+  CellTools cell = test::spindle_only();
+  cell.gravity_B = -Vector3::UnitZ();
+  for (const char* turned : {"A 0.0,B 0.0,C 180.0", "A 0.0,B 180.0,C 0.0"}) {
+    const std::vector<SourceFile> files = {
+        {"R1/Program/p.src", src(line)},
+        {"R1/System/$config.dat", kConfig},
+        {"R1/Mada/$machine.dat",
+         machine("FRAME $ROBROOT={X 0,Y 0,Z 2500," + std::string(turned) + "}\n")}};
+    const test::Corrected made = corrected_by_shift(Dialect::kKrl, files, {}, {}, cell);
+    ASSERT_EQ(made.program.contradictions.size(), 1u) << made.refusal;
+    const std::string said = made.program.contradictions[0];
+    for (const char* part : {"$ROBROOT (R1/Mada/$machine.dat line 3) the robot is hanging",
+                             "by the cell's base and gravity it is standing", "180 deg apart"})
+      EXPECT_TRUE(has(said, part)) << part << ": " << said;
+    EXPECT_EQ(receipt_summary(made.program).rfind("warning: by $ROBROOT", 0), 0u);
+    EXPECT_FALSE(has(all(made.program.notes), "hanging")) << "said once";
+    cell.gravity_B = Vector3::UnitZ();
+    EXPECT_TRUE(
+        corrected_by_shift(Dialect::kKrl, files, {}, {}, cell).program.contradictions.empty());
+    cell.gravity_B = -Vector3::UnitZ();
   }
 }
 

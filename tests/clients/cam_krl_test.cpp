@@ -541,6 +541,59 @@ TEST(Krl, AUnitThatIsNoneCarriesNoBase) {
             std::string::npos);
 }
 
+/// As controllers have it in `$config.dat`: the second unit turns, base 2 is on it.
+std::vector<SourceFile> with_positioner(const std::string& lines, const std::string& type,
+                                        const std::string& index = "2") {
+  std::string config = kConfig;
+  const std::string units =
+      "MACHINE_DEF[2]={NAME[] \"DKP-400\",COOP_KRC_INDEX 1,PARENT[] \"WORLD\",ROOT {X 1200.0,Y "
+      "0.0,Z 0.0,A 0.0,B 0.0,C 0.0},MECH_TYPE " +
+      type + ",GEOMETRY[] \" \"}\r\nMACHINE_FRAME_DAT[2]={MACH_DEF_INDEX " + index +
+      ",PARENT[] \"DKP-400\",GEOMETRY[] \" \"}\r\n";
+  config.insert(config.find("ENDDAT"), units);
+  return {{"p.src", program(lines)}, {"$config.dat", config}};
+}
+
+TEST(Krl, ABaseOnAPositionerIsMovingHoweverItIsSet) {
+  for (const char* set : {"$BASE=BASE_DATA[2]", "$BASE=BASE_DATA[2]:{X 10,Y 0,Z 0,A 0,B 0,C 0}",
+                          "$BASE=MACHINE_DEF[2].ROOT:{X 300,Y 0,Z 500,A 0,B 0,C 0}", "BAS(#BASE,2)",
+                          "$BASE=EK(MACHINE_DEF[2].ROOT,MACHINE_DEF[2].MECH_TYPE,BASE_DATA[2])",
+                          "MACH_DEF_INDEX[2]=2\n$BASE={X 1500,Y 0,Z 500,A 0,B 0,C 0}"}) {
+    const test::Corrected made = corrected_by_shift(
+        Dialect::kKrl,
+        with_positioner(std::string(set) + "\nLIN " + kPoint + "\n$BASE=$NULLFRAME\n", "#EASYS"));
+    EXPECT_FALSE(row_of(made.program, kPoint).corrected()) << set;
+    EXPECT_NE(test::why(made, kPoint).find("external kinematics"), std::string::npos)
+        << set << ": " << test::why(made, kPoint);
+  }
+  for (const auto& [type, index] : {std::pair("#NONE", "2"), std::pair("#EASYS", "0")}) {
+    const test::Corrected made = corrected_by_shift(
+        Dialect::kKrl, with_positioner("$BASE=BASE_DATA[2]\nLIN " + kPoint + "\n", type, index));
+    EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << type << test::why(made, kPoint);
+  }
+}
+
+TEST(Krl, HomesAreToldAsWhatTheyAre) {
+  const std::string axes = "{A1 0,A2 -20,A3 20,A4 0,A5 30,A6 0}";
+  for (const char* motion : {"PTP XHOME", "PTP HOME Vel=100 % DEFAULT", "PTP $H_POS"}) {
+    const std::string lines = program(std::string(motion) + "\nLIN " + kPoint + "\n");
+    const test::Corrected elsewhere = krl(lines);
+    EXPECT_NE(elsewhere.program.rows[0].message.find("it is a home position of the controller"),
+              std::string::npos)
+        << motion << ": " << elsewhere.program.rows[0].message;
+    const std::string home = "DEFDAT p\nE6AXIS XHOME=" + axes + "\n$H_POS=XHOME\nENDDAT\n";
+    const test::Corrected here = krl(lines, home);
+    EXPECT_EQ(here.program.left_alone(), 0u) << motion << ": " << here.program.rows[0].message;
+    EXPECT_EQ(here.program.moves_corrected, 2u) << motion;
+    ReadOptions folder;
+    folder.spared = {"p.dat"};
+    const test::Corrected spared = krl(lines, home, folder);
+    EXPECT_NE(spared.program.rows[0].message.find("it is a home position, joints in a system file"),
+              std::string::npos)
+        << motion << ": " << spared.program.rows[0].message;
+  }
+}
+
 TEST(Krl, AnExternalAxisThatMovesWithoutATargetMovesBeneathAll) {
   for (const char* motion :
        {"PTP {E1 90}", "ASYPTP {E1 90}", "PTP_REL {E1 90}", "LIN_REL {X 5,Y 0,Z 0,E1 90}"}) {

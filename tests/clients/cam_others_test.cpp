@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/support/shifting_model.h"
 
 namespace trammel::cam {
@@ -40,6 +42,17 @@ TEST(Inform, OnlyNumbersOfPositionsChange) {
       << made.program.files[0].text;
   EXPECT_NE(made.program.files[0].text.find("NOP\r\n'TRAMMEL model=0123456789ab\r\n"),
             std::string::npos);
+}
+
+TEST(Inform, HowTheWristIsReadIsSaidOnce) {
+  const test::Corrected made =
+      jbi(job("C00000=1800,-250,800,0,60,0\r\nC00001=1800.0,0,900.,0,60,0\r\n",
+              "MOVJ C00000 VJ=50.00\r\nMOVL C00001 V=100.0 PL=0\r\n"));
+  const auto said = std::count_if(
+      made.program.notes.begin(), made.program.notes.end(), [](const std::string& note) {
+        return note.find("the first number of RCONF is read by axis B") != std::string::npos;
+      });
+  EXPECT_EQ(said, 1);
 }
 
 TEST(Inform, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {

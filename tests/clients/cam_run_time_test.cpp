@@ -399,7 +399,7 @@ TEST(RunTimeKrl, WhatMovesWithLimitedTorquesIsLeftUntilTheyAreWhole) {
   }
 }
 
-TEST(RunTimeKrl, ARobotThatHangsByItsRobrootAndStandsByTheCellIsANote) {
+TEST(RunTimeKrl, ARobotThatHangsByItsRobrootAndStandsByTheCellIsAContradiction) {
   CellTools cell = test::spindle_only();
   cell.gravity_B = -Vector3::UnitZ();
   const auto made = [&](const std::string& turned) {
@@ -412,9 +412,10 @@ TEST(RunTimeKrl, ARobotThatHangsByItsRobrootAndStandsByTheCellIsANote) {
                                                     turned + "}\nENDDAT\n"}},
                               {}, {}, cell);
   };
-  EXPECT_TRUE(has(notes(made("A 0,B 180,C 0")), "180 deg off: see that the model"))
-      << notes(made("A 0,B 180,C 0"));
-  EXPECT_FALSE(has(notes(made("A 90,B 0,C 0")), "deg off")) << notes(made("A 90,B 0,C 0"));
+  const std::vector<std::string> said = made("A 0,B 180,C 0").program.contradictions;
+  ASSERT_EQ(said.size(), 1u);
+  EXPECT_TRUE(has(said[0], "180 deg apart")) << said[0];
+  EXPECT_TRUE(made("A 90,B 0,C 0").program.contradictions.empty());
 }
 
 // Yaskawa

@@ -1,8 +1,11 @@
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "clients/cam/taught.h"
 #include "tests/support/shifting_model.h"
@@ -75,6 +78,57 @@ TEST(TaughtTargets, WhatADrawingOrAPostMadeIsNotTakenForThem) {
   std::vector<Pose> few = jogged(1);
   few.resize(3);
   EXPECT_EQ(said_of(few), "") << "three poses show no habit";
+}
+
+/// What is said of a UR script with these lines; empty: nothing of taught ones.
+std::string said_of_script(const std::string& lines) {
+  const test::Corrected made = test::corrected_by_shift(
+      Dialect::kUrScript,
+      {{"p.script",
+        "def p():\n  set_tcp(p[0.1, 0, 0.15, 0, -0.785398163, 0])\n" + lines + "end\n"}});
+  EXPECT_EQ(made.refusal, "");
+  for (const std::string& note : made.program.notes)
+    if (note.find("look taught") != std::string::npos) return note;
+  return "";
+}
+
+/// Joints of the pendant, as doubles; `round_deg`: the same to this, as somebody who wrote them.
+std::string moved_to_joints(double round_deg) {
+  std::string lines;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> angle(-.3, .3);
+  for (int k = 0; k < 6; ++k) {
+    std::vector<std::string> numbers;
+    for (const double at : {0.1, -.35, .35, .1, .5, .1}) {
+      const double deg = to_deg(at + angle(random));
+      numbers.push_back(fmt::format(
+          "{:.16f}", from_deg(round_deg > 0 ? round_deg * std::round(deg / round_deg) : deg)));
+    }
+    lines += fmt::format("  movej([{}])\n", fmt::join(numbers, ", "));
+  }
+  return lines;
+}
+
+TEST(TaughtTargets, OfAUrTheJointsOfThePendantAreToldByTheirDigits) {
+  EXPECT_NE(said_of_script(moved_to_joints(0)).find("6 of 6 joint targets look taught"),
+            std::string::npos)
+      << said_of_script(moved_to_joints(0));
+  EXPECT_EQ(said_of_script(moved_to_joints(0.5)), "") << "somebody wrote these";
+}
+
+TEST(TaughtTargets, OfAUrAWayJoggedAlongAnAxisIsTaughtThoughItsNumbersNearlyStandTwice) {
+  // The pendant's digits: along z the others stay within picometres, and the turn stays.
+  const auto script = [](bool written) {
+    std::string lines = "  movej([0, -0.349, 0.349, 0, 0.524, 0])\n";
+    for (int k = 0; k < 6; ++k)
+      lines += fmt::format(
+          "  movel(p[1.72013968656{},-0.12543562006{},0.{}3013002542,0.001221359682,1.566276528482,"
+          "0.038891915637], a=1.2, v=0.25)\n",
+          written ? 4 : k, written ? 4 : 7 - k, 80 + 3 * k);
+    return lines;
+  };
+  EXPECT_NE(said_of_script(script(false)).find("look taught"), std::string::npos);
+  EXPECT_EQ(said_of_script(script(true)), "") << "the same numbers: a post wrote them";
 }
 
 }  // namespace

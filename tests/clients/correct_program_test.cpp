@@ -486,5 +486,48 @@ TEST_F(CorrectProgram, MeasuringProgramsOfEveryControllerArePredictedAsTheyArePl
   }
 }
 
+TEST_F(CorrectProgram, APredictionOfACorrectedProgramSaysThatItIsCorrected) {
+  const std::string before = module("m.mod");
+  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), 0);
+  const auto said_of = [&](const std::string& name) {
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run("predict",
+                  {"--model", model(), file(name), "-o", file("p.csv"), "--json", file("p.json")}),
+              0);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(said_of("m.mod").find("corrected already"), std::string::npos);
+  const std::string said = said_of("out.mod");
+  EXPECT_NE(said.find("warning: out.mod: it is corrected already, by model "), std::string::npos)
+      << said;
+  EXPECT_LT(said.find("warning: out.mod"), said.find("targets:")) << said;
+  EXPECT_EQ(nlohmann::json::parse(text("p.json"))["notes"][0]["code"], "corrected_already");
+}
+
+TEST_F(CorrectProgram, ATargetThatStandsInItsMotionHasAShortNameInTables) {
+  const std::string before = module("m.mod");
+  std::string lines = text("m.mod");
+  const std::string in_motion =
+      "[[1800.1,0,1000],[0.669131,0,0.743145,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+  const std::string motions = "    MoveL " + in_motion + ",v100,fine,tSpindle;\n    MoveL Offs(" +
+                              in_motion + ",0,0,50),v100,fine,tSpindle;\n";
+  lines.insert(lines.find("  ENDPROC"), motions);
+  folder_.write("m.mod", lines);
+  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("r.csv"),
+                     "--json", file("r.json"), "--report", file("r.html")}),
+            0);
+  const CsvTable receipt = CsvTable::parse(text("r.csv"), "r.csv").value();
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < 3; ++k)
+    names.push_back(receipt.field(k, receipt.find("name").value()));
+  EXPECT_EQ(names, (std::vector<std::string>{"p10", "point 1 at line 6", "point 2 at line 7"}));
+  EXPECT_EQ(nlohmann::json::parse(text("r.json"))["targets"][1]["name"], "point 1 at line 6");
+  const std::string page = text("r.html");
+  EXPECT_EQ(page.find("9E9"), std::string::npos) << "the text of a target";
+  ASSERT_EQ(run("predict", {"--model", model(), before, "-o", file("p.csv")}), 0);
+  EXPECT_EQ(text("p.csv").find("9E9"), std::string::npos) << text("p.csv");
+  EXPECT_NE(text("p.csv").find("point 2 at line 7"), std::string::npos) << text("p.csv");
+}
+
 }  // namespace
 }  // namespace trammel::cli

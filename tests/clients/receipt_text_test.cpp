@@ -50,5 +50,15 @@ TEST(LeftTargets, WhereSomethingIsCorrectedNoSingleReasonIsHeldUp) {
   EXPECT_EQ(left_alone_text(some).find("no motion is corrected"), std::string::npos);
 }
 
+TEST(Receipt, ANoteThatHoldsManyTimesStandsOnceWithItsNumber) {
+  cam::CorrectedProgram made = program(1, 0);
+  made.notes.assign(31, "a value is not read");
+  made.notes.emplace_back("another one");
+  const std::string said = receipt_summary(made);
+  EXPECT_NE(said.find("note: a value is not read (31 times)\nnote: another one\n"),
+            std::string::npos)
+      << said;
+}
+
 }  // namespace
 }  // namespace trammel::cam

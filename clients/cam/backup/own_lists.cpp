@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <string_view>
 
 #include "clients/cam/backup/backup.h"
@@ -34,10 +36,30 @@ std::string yaml_key(const std::string& name) {
 
 void add_tool(const std::string& name, StatedTool tool, ControllerCell& cell) {
   if (tool.load && tool.load->mass <= 0) tool.load.reset();
-  if (!tool.load)
-    cell.notes.push_back(
-        fmt::format("tool {} has no load there: its payload is to be written by hand", name));
   cell.tools.emplace(name, std::move(tool));
+}
+
+/// `TOOL[1], TOOL[2], TOOL[3] and 28 more`
+std::string some_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kNamed = 3;
+  const auto named = static_cast<std::ptrdiff_t>(std::min(names.size(), kNamed));
+  const std::string more =
+      names.size() > kNamed ? fmt::format(" and {} more", names.size() - kNamed) : "";
+  return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + named, ", "), more);
+}
+
+/// One sentence for all tools without a load, however many lists have.
+void note_loads(ControllerCell& cell) {
+  std::vector<std::string> without;
+  for (const auto& [name, tool] : cell.tools)
+    if (!tool.load) without.push_back(name);
+  if (without.size() == 1)
+    cell.notes.push_back(
+        fmt::format("tool {} has no load there: its payload is to be written by hand", without[0]));
+  if (without.size() > 1)
+    cell.notes.push_back(
+        fmt::format("{} tools have no load there ({}): their payloads are to be written by hand",
+                    without.size(), some_of(without)));
 }
 
 ControllerCell kuka_cell(const std::vector<SourceFile>& files) {
@@ -148,6 +170,7 @@ ControllerCell cell_of_program(const Program& program) {
     if (stated.load && is_placeholder(*stated.load)) stated.load.reset();
     add_tool(yaml_key(tool.name), std::move(stated), cell);
   }
+  note_loads(cell);
   for (const ProgramFrame& frame : program.frames)
     if (frame.why_not.empty() && !frame.name.empty()) cell.frames.emplace(frame.name, frame.X_BO);
   return cell;
@@ -170,6 +193,7 @@ Result<ControllerCell> read_own_lists(Dialect dialect, const std::vector<SourceF
   if (dialect == Dialect::kInform)
     cell = listed_cell(inform::conditions(files), "Yaskawa", stated_type(dialect, files));
   cell.unit = "ROBOT";
+  note_loads(cell);
   cell.notes.emplace_back(
       "whether the controller corrects the robot itself is not in these files: write "
       "controller_compensates by hand");

@@ -376,6 +376,19 @@ void read_motions(std::vector<Job>& jobs) {
   for (Job& job : jobs) job.list_unused();
 }
 
+/// Yaskawa's manuals count the wrist in two ways, which are opposite for a tool that points down.
+void note_wrist(Program& program) {
+  const auto first = std::find_if(
+      program.targets.begin(), program.targets.end(),
+      [](const ProgramTarget& target) { return target.configuration.bends_down.has_value(); });
+  if (first == program.targets.end()) return;
+  program.notes.push_back(fmt::format(
+      "{} ({} line {}): the first number of RCONF is read by axis B, 1 where it bends the tool "
+      "down. Older controllers (NX100) count it by axis R: compare the axes of one position in the "
+      "receipt with the pendant before the job runs",
+      shown(first->name), program.files[first->file].name, first->line));
+}
+
 }  // namespace
 
 Program read_inform(std::vector<SourceFile> files, const ReadOptions& options) {
@@ -393,6 +406,7 @@ Program read_inform(std::vector<SourceFile> files, const ReadOptions& options) {
   sites.finish(program, [&](const Site& site, ProgramTarget& target) {
     return jobs[site.file].describe(site, target);
   });
+  note_wrist(program);
   return program;
 }
 

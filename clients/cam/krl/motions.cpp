@@ -15,6 +15,14 @@ namespace trammel::cam::krl {
 
 namespace {
 
+constexpr const char* kHomeElsewhere =
+    "it is a home position of the controller, which is not in the files handed over";
+
+/// `XHOME`, `XHOME2`, `$H_POS`, `$AXIS_HOME[1]`: joints that the controller keeps.
+bool is_home(const std::string& name) {
+  return name.starts_with("XHOME") || name.starts_with("$H_POS") || name.starts_with("$AXIS_HOME[");
+}
+
 Span span_of(const std::vector<Value>& operands) {
   return {operands.front().begin, operands.back().end};
 }
@@ -116,13 +124,28 @@ void Motions::use(std::size_t f, std::size_t k, const std::vector<Value>& operan
   }
   if (operands[0].kind != Value::Kind::kName)
     return leave_at(f, k, name, "an expression decides it");
-  const std::string& wanted = operands[0].name;
-  if (wanted.starts_with("$"))
-    return leave_at(f, k, name, fmt::format("{} decides it", shown(wanted)));
+  const std::string wanted = home_at(f, k, operands[0].name);
+  if (wanted.starts_with("$") && !names_.is_set(wanted, f))
+    return leave_at(f, k, name,
+                    is_home(wanted) ? std::string(kHomeElsewhere)
+                                    : fmt::format("{} decides it", shown(wanted)));
+  if (is_home(wanted) && !names_.is_set(wanted, f)) return leave_at(f, k, name, kHomeElsewhere);
   if (wanted.find("[*]") != std::string::npos) return use_any(f, k, wanted, name, use);
   const Told<const Assigned*> one = names_.value_of(wanted, f);
   if (one && (*one)->operands.size() == 1) note_axes((*one)->operands[0], move);
   use_named(f, k, wanted, name, use);
+}
+
+/// The variable that a motion names: the line of an inline form, `PTP HOME Vel=100 % DEFAULT`, says
+/// HOME for XHOME. `$H_POS=XHOME` makes the home of the controller that one.
+std::string Motions::home_at(std::size_t f, std::size_t k, const std::string& name) const {
+  const Tokens& tokens = lines_[f][k].tokens;
+  if (name.starts_with("HOME") && tokens[2].is("VEL") && tokens[3].is("=")) return "X" + name;
+  if (name != "$H_POS") return name;
+  const Told<const Assigned*> set = names_.value_of(name, f);
+  const bool by_name =
+      set && (*set)->operands.size() == 1 && (*set)->operands[0].kind == Value::Kind::kName;
+  return by_name ? (*set)->operands[0].name : name;
 }
 
 /// `PTP XP[i]`: any of its elements.

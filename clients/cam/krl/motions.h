@@ -44,6 +44,7 @@ class Motions {
   void leave_at(std::size_t f, std::size_t k, const std::string& name, const std::string& why);
   std::size_t move_at(std::size_t f, std::size_t k);
   void use(std::size_t f, std::size_t k, const std::vector<Value>& operands, const State& state);
+  [[nodiscard]] std::string home_at(std::size_t f, std::size_t k, const std::string& name) const;
   void use_any(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name,
                const SiteUse& use);
   void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name,

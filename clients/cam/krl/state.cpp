@@ -27,6 +27,7 @@ void Settings::set(std::size_t f, std::size_t k, State& state) {
   if (tokens.empty()) return;
   set_sensor(tokens, f, k, state);
   set_soft(tokens, f, k, state);
+  set_unit(tokens, f, k, state);
   sets_by_hand_ |= tokens[0].is("$TOOL") || tokens[0].is("$BASE");
   if (const auto setting = setting_of(tokens)) {
     if (setting->whole)
@@ -39,7 +40,7 @@ void Settings::set(std::size_t f, std::size_t k, State& state) {
 
 void Settings::apply(const Setting& setting, std::size_t f, std::size_t k, State& state) {
   if (setting.name == "$TOOL") state.tool = tools_.tool_set(setting.operands, f, k);
-  if (setting.name == "$BASE") state.frame = tools_.base_set(setting.operands, f);
+  if (setting.name == "$BASE") set_base(setting, f, k, state);
   if (setting.name == "$LOAD") state.load = tools_.load_set(setting.operands, f, k);
   if (setting.name == "$IPO_MODE")
     state.fixed_tool = why_fixed(setting.function.empty() ? setting.constant : "");
@@ -50,6 +51,32 @@ void Settings::apply(const Setting& setting, std::size_t f, std::size_t k, State
     apply_fdat(std::string(setting.function.empty() ? from.text : setting.function), f, state);
   else
     apply_part(setting, names_.place(f, k), state);
+}
+
+/// `$BASE=EK(MACHINE_DEF[2].ROOT,MACHINE_DEF[2].MECH_TYPE,{X 0,...})` follows the unit; what stands
+/// for itself does so behind `MACH_DEF_INDEX[17]=2`.
+void Settings::set_base(const Setting& setting, std::size_t f, std::size_t k, State& state) {
+  if (setting.function == "EK")
+    state.frame = tools_.unknown_base(carried_at(f, k));
+  else if (!state.carried.empty())
+    state.frame = tools_.unknown_base(state.carried);
+  else
+    state.frame = tools_.base_set(setting.operands, f);
+}
+
+/// `MACH_DEF_INDEX[17]=2` in a routine attaches a base to a unit while the program runs; 0 takes it
+/// off. BAS( ) and inline forms choose a base of their own, and say themselves which.
+void Settings::set_unit(const Tokens& tokens, std::size_t f, std::size_t k, State& state) const {
+  static const std::set<std::string_view> kUnits = {"MACH_DEF_INDEX", "MACH_DEF",
+                                                    "MACHINE_FRAME_DAT"};
+  if (!kUnits.contains(tokens[0].text)) return;
+  const std::size_t value = tokens.find("=") + 1;
+  if (value >= tokens.size()) return;
+  const auto number = tokens[value].is_number() ? number_in(tokens[value]) : std::nullopt;
+  const bool none = tokens[value].is("-") || (number && number->value <= 0);
+  state.carried = none ? ""
+                       : fmt::format("external kinematics carry the base ({}, {})", tokens[0].text,
+                                     names_.place(f, k));
 }
 
 /// `$TOOL.X=3`
@@ -78,6 +105,7 @@ void Settings::join(State& state, const State& other, const std::string& by) {
   if (state.fixed_tool != other.fixed_tool && state.fixed_tool.empty()) state.fixed_tool = why;
   if (state.sensed.empty()) state.sensed = other.sensed;
   if (state.soft.empty()) state.soft = other.soft;
+  if (state.carried.empty()) state.carried = other.carried;
   state.armed |= other.armed;
   state.speed = std::max(state.speed, other.speed);
 }
@@ -181,9 +209,7 @@ std::string Settings::carried_at(std::size_t f, std::size_t k) const {
 void Settings::apply_one_with(const Setting& setting, std::size_t f, std::size_t k, State& state) {
   static const std::set<std::string_view> kOfFdat = {"STOOL2", "STOOL", "SBASE", "SIPO_MODE",
                                                      "SLOAD"};
-  if (setting.name == "$BASE" && setting.function == "EK") {
-    state.frame = tools_.unknown_base(carried_at(f, k));
-  } else if (kOfFdat.contains(setting.function) && setting.argument.is_word()) {
+  if (kOfFdat.contains(setting.function) && setting.argument.is_word()) {
     State by_fdat = state;
     apply_fdat(std::string(setting.argument.text), f, by_fdat);
     if (setting.name == "$TOOL") state.tool = by_fdat.tool;

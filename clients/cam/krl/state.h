@@ -19,6 +19,7 @@ struct State {
   std::size_t load = 0;          ///< 0: the tool's own
   std::string fixed_tool;        ///< why the robot does not hold the tool; empty: it does
   std::string sensed;            ///< why a sensor moves the path; empty: none does
+  std::string carried;           ///< why a base that is set by itself moves; empty: it stands
   std::string soft;              ///< why a force may move the axes; empty: none may
   std::uint64_t armed = 0;       ///< interrupts that are declared, a bit each
   double speed = kSpeedUnknown;  ///< of the tool, mm/s
@@ -43,6 +44,8 @@ class Settings {
 
  private:
   void apply(const Setting& setting, std::size_t f, std::size_t k, State& state);
+  void set_base(const Setting& setting, std::size_t f, std::size_t k, State& state);
+  void set_unit(const Tokens& tokens, std::size_t f, std::size_t k, State& state) const;
   void apply_part(const Setting& setting, const std::string& place, State& state);
   void apply_one_with(const Setting& setting, std::size_t f, std::size_t k, State& state);
   void apply_fdat(const std::string& name, std::size_t f, State& state);

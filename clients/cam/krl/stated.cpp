@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/base/units.h"
 
@@ -23,6 +24,7 @@ class Stated {
     }
     find_base();
     find_numbers();
+    find_limits();
   }
 
  private:
@@ -89,6 +91,23 @@ class Stated {
     add(ArmNumber::kAxis3ToWrist, "$TX3P3", along);
     add(ArmNumber::kWristToFlange, "$TFLWP", along);
     add(ArmNumber::kTiltOfFlange, "$TFLWP", tilt);
+  }
+
+  /// `$SOFTN_END[3]=-115.0`, of the axes of the arm.
+  void find_limits() {
+    constexpr int kOfTheArm = 6;
+    for (int axis = 0; axis < kOfTheArm; ++axis) {
+      for (const auto& [stem, upper] :
+           {std::pair("$SOFTN_END", false), std::pair("$SOFTP_END", true)}) {
+        const std::string name = fmt::format("{}[{}]", stem, axis + 1);
+        const bool is_upper = upper;
+        at_each(name, [&](const Assigned& at, const Value& value) {
+          if (value.kind == Value::Kind::kNumber)
+            program_.limits.push_back({axis, is_upper, from_deg(value.number), name,
+                                       program_.files[at.file].name, line_at(at)});
+        });
+      }
+    }
   }
 
   /// `$TRAFONAME[]="#KR210R2700 EXTRA C4 FLR"`, the same as `$MODEL_NAME[]`, `DECL EX_KIN

@@ -68,8 +68,6 @@ std::size_t Tools::tool_numbered(int number, std::size_t f) {
 std::size_t Tools::base_numbered(int number, std::size_t f) {
   if (number == 0) return 1;
   const std::string data = fmt::format("BASE_DATA[{}]", number);
-  if (const std::string why = carried(number, f); !why.empty())
-    return add_frame({data, Pose::Identity(), why});
   Value name;
   name.kind = Value::Kind::kName;
   name.name = data;
@@ -95,6 +93,10 @@ std::size_t Tools::base_set(const std::vector<Value>& operands, std::size_t f) {
   ProgramFrame frame;
   frame.name =
       operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
+  if (std::string why = carried_by(operands, f); !why.empty()) {
+    frame.why_not = std::move(why);
+    return add_frame(std::move(frame));
+  }
   const bool numbered =
       frame.name.starts_with("BASE_DATA[") && frame.name.find('*') == std::string::npos;
   Told<Pose> X_WO = names_.frame_of(operands, f);
@@ -203,27 +205,56 @@ std::string Tools::note_on_default(const std::optional<StatedLoad>& load,
       load->mass, names_.place(at.file, at.line));
 }
 
-/// The reason why a base moves: `MACH_DEF_INDEX[2]=3` attaches it to a unit of the controller.
-/// Empty if the base does not move.
-std::string Tools::carried(int number, std::size_t f) const {
-  const Variable* unit = names_.find(fmt::format("MACH_DEF_INDEX[{}]", number), f);
-  if (unit == nullptr || unit->values.empty() || unit->values[0].operands.size() != 1) return "";
-  const Assigned& at = unit->values[0];
-  if (at.operands[0].kind == Value::Kind::kNumber &&
-      (at.operands[0].number <= 0 || carries_nothing(at, f)))
-    return "";
-  return fmt::format("external kinematics carry base {} (MACH_DEF_INDEX, {})", number,
-                     names_.place(at.file, at.line));
-}
-
-/// True for `MACHINE_DEF[3]={NAME[] "",...,MECH_TYPE #NONE}`: the unit does not exist.
-bool Tools::carries_nothing(const Assigned& index, std::size_t f) const {
+/// True if the number is that of a unit of the controller, or is not known. 0 and less is none, and
+/// `MACHINE_DEF[3]={NAME[] "",...,MECH_TYPE #NONE}` does not exist.
+bool Tools::is_unit(const Value* index, std::size_t f) const {
+  if (index == nullptr) return false;
+  if (index->kind != Value::Kind::kNumber) return true;
+  if (index->number <= 0) return false;
   const Told<const Assigned*> unit =
-      names_.value_of(fmt::format("MACHINE_DEF[{:g}]", index.operands[0].number), f);
+      names_.value_of(fmt::format("MACHINE_DEF[{:g}]", index->number), f);
   const Value* type =
       unit && (*unit)->operands.size() == 1 ? (*unit)->operands[0].field("MECH_TYPE") : nullptr;
-  return type != nullptr &&
-         upper(program_.files[(*unit)->file].text.substr(type->begin, 5)) == "#NONE";
+  return type == nullptr ||
+         upper(program_.files[(*unit)->file].text.substr(type->begin, 5)) != "#NONE";
+}
+
+/// The reason why a base moves: `MACH_DEF_INDEX[2]=3` or `MACHINE_FRAME_DAT[2]={MACH_DEF_INDEX
+/// 3,...}` attaches it to a unit of the controller, anywhere in the files. Empty if it does not.
+std::string Tools::carried(int number, std::size_t f) const {
+  const std::string plain = fmt::format("MACH_DEF_INDEX[{}]", number),
+                    in_list = fmt::format("MACHINE_FRAME_DAT[{}]", number);
+  for (const auto& [key, variable] : names_.all()) {
+    if (key.second != plain && key.second != in_list) continue;
+    for (const Assigned& at : variable.values) {
+      if (at.operands.size() != 1) continue;
+      const Value* index =
+          key.second == plain ? &at.operands[0] : at.operands[0].field("MACH_DEF_INDEX");
+      if (is_unit(index, f))
+        return fmt::format("external kinematics carry base {} ({}, {})", number,
+                           key.second.substr(0, key.second.find('[')),
+                           names_.place(at.file, at.line));
+    }
+  }
+  return "";
+}
+
+/// The same of an expression: one of its operands is such a base, or a unit's place
+/// (`MACHINE_DEF[2].ROOT`), or stands for one.
+std::string Tools::carried_by(const std::vector<Value>& operands, std::size_t f, int depth) const {
+  constexpr int kDeepest = 20;
+  for (const Value& operand : operands) {
+    if (operand.kind != Value::Kind::kName || depth > kDeepest) continue;
+    const std::string& name = operand.name;
+    if (name.starts_with("MACHINE_DEF["))
+      return fmt::format("{} is the place of external kinematics", shown(name));
+    const bool numbered = name.starts_with("BASE_DATA[") && name.find('*') == std::string::npos;
+    std::string why = numbered ? carried(std::atoi(name.c_str() + 10), f) : "";
+    if (const Told<const Assigned*> value = names_.value_of(name, f); why.empty() && value)
+      why = carried_by((*value)->operands, (*value)->file, depth + 1);
+    if (!why.empty()) return why;
+  }
+  return "";
 }
 
 }  // namespace trammel::cam::krl

@@ -55,7 +55,9 @@ class Tools {
   [[nodiscard]] std::string note_on_default(const std::optional<StatedLoad>& load,
                                             const Assigned& at) const;
   [[nodiscard]] std::string carried(int number, std::size_t f) const;
-  [[nodiscard]] bool carries_nothing(const Assigned& index, std::size_t f) const;
+  [[nodiscard]] std::string carried_by(const std::vector<Value>& operands, std::size_t f,
+                                       int depth = 0) const;
+  [[nodiscard]] bool is_unit(const Value* index, std::size_t f) const;
 
   const std::vector<std::vector<Line>>& lines_;
   const Variables& names_;

@@ -75,6 +75,9 @@ std::set<std::string> names_in(const std::string& folder) {
 
 constexpr cam::Dialect kWithLists[] = {cam::Dialect::kKrl, cam::Dialect::kFanuc,
                                        cam::Dialect::kInform};
+/// The same, those whose programs have an ending of their own first.
+constexpr cam::Dialect kByPrograms[] = {cam::Dialect::kFanuc, cam::Dialect::kInform,
+                                        cam::Dialect::kKrl};
 
 /// As the controller names it; empty: it does not.
 std::string type_of(const cam::ControllerCell& controller) {
@@ -94,11 +97,16 @@ std::optional<cam::Dialect> maker_of(const std::string& folder) {
   std::error_code error;
   if (fs::exists(parameters_of(folder), error)) return cam::Dialect::kRapid;
   const std::set<std::string> files = names_in(folder);
+  // A list says it for sure. Endings do not: FANUC's and Yaskawa's backups have `.dat` files, too.
   for (const cam::Dialect dialect : kWithLists) {
     const std::set<std::string> lists = cam::own_lists_of(dialect);
-    if (std::any_of(files.begin(), files.end(), [&](const std::string& file) {
-          return lists.contains(file) || cam::dialect_of_file(file) == dialect;
-        }))
+    if (std::any_of(files.begin(), files.end(),
+                    [&](const std::string& file) { return lists.contains(file); }))
+      return dialect;
+  }
+  for (const cam::Dialect dialect : kByPrograms) {
+    if (std::any_of(files.begin(), files.end(),
+                    [&](const std::string& file) { return cam::dialect_of_file(file) == dialect; }))
       return dialect;
   }
   return std::nullopt;

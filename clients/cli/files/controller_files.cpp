@@ -31,9 +31,10 @@ struct NotRead {
 const std::array<NotRead, 6>& not_read() {
   static const std::array<NotRead, 6> kAll = {
       {{cam::Dialect::kInform, ".prm",
-        "parameters of the controller are not read, since each controller numbers them otherwise; "
-        "pulses_per_deg in the robot file or --pulses-per-deg S,L,U,R,B,T tells how many pulses "
-        "make a degree of each axis"},
+        "parameters of the controller are not read, and positions in coordinates need none of "
+        "them; "
+        "positions in pulses need the pulses to a degree of each axis, which pulses_per_deg in the "
+        "robot file or --pulses-per-deg S,L,U,R,B,T tells"},
        {cam::Dialect::kInform, ".dat",
         "data of the controller (home positions, variables) are not read"},
        {cam::Dialect::kFanuc, ".sv",

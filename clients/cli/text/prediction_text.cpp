@@ -6,6 +6,7 @@
 #include <map>
 #include <tuple>
 
+#include "clients/cam/short_names.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/note_json.h"
@@ -50,7 +51,7 @@ std::string prediction_csv(const PredictedProgram& program) {
       "mm,dz_mm,error_mm,slx_mm,sly_mm,slz_mm,expected_mm,model_id,message\n";
   for (const PredictedTarget& row : program.targets) {
     text += fmt::format("{},{},{},{},{},{},{},{},", csv_field(row.file), row.line,
-                        csv_field(row.name), csv_field(row.motion),
+                        csv_field(cam::shown_name(row)), csv_field(row.motion),
                         csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
                         csv_field(row.tool), csv_field(row.frame), row.status);
     const auto& [error, spread] = std::tie(row.predicted.error_mm, row.predicted.true_stddev_mm);
@@ -72,7 +73,7 @@ ordered_json prediction_json(const PredictedProgram& program) {
   ordered_json targets = ordered_json::array();
   for (const PredictedTarget& row : program.targets) {
     ordered_json item = {
-        {"file", row.file},     {"line", row.line},       {"name", row.name},
+        {"file", row.file},     {"line", row.line},       {"name", cam::shown_name(row)},
         {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
         {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
     if (std::isfinite(row.p_B.x()))
@@ -85,7 +86,12 @@ ordered_json prediction_json(const PredictedProgram& program) {
     }
     targets.push_back(std::move(item));
   }
-  std::vector<Note> notes = program.model.notes;
+  std::vector<Note> notes;
+  for (const std::string& one : program.corrected)
+    notes.push_back({"corrected_already", Note::Severity::kWarning, one});
+  for (const std::string& one : program.contradictions)
+    notes.push_back({"contradiction", Note::Severity::kWarning, one});
+  notes.insert(notes.end(), program.model.notes.begin(), program.model.notes.end());
   for (const std::string& one : program.notes)
     notes.push_back({"program", Note::Severity::kInfo, one});
   return {{"model", program.model_id}, {"notes", notes_json(notes)}, {"targets", targets}};
@@ -99,15 +105,20 @@ std::string prediction_summary(const PredictedProgram& program) {
   for (const PredictedTarget& row : program.targets) {
     ++counts[row.status];
     if (!has_prediction(row)) {
-      left += fmt::format("  {} line {}: {}{}: {}\n", row.file, row.line,
-                          row.name.empty() ? "" : row.name + ": ", row.status, row.message);
+      left +=
+          fmt::format("  {} line {}: {}{}: {}\n", row.file, row.line,
+                      row.name.empty() ? "" : cam::shown_name(row) + ": ", row.status, row.message);
       continue;
     }
     ++known;
     squares += expected_mm(row) * expected_mm(row);
     most = std::max(most, expected_mm(row));
   }
-  std::string text = fmt::format("{} targets:", program.targets.size());
+  std::string text;
+  for (const auto* list : {&program.corrected, &program.contradictions}) {
+    for (const std::string& one : *list) text += "warning: " + one + "\n";
+  }
+  text += fmt::format("{} targets:", program.targets.size());
   const char* separator = " ";
   for (const auto& [status, count] : counts) {
     text += fmt::format("{}{} {}", separator, count, status);
@@ -117,7 +128,7 @@ std::string prediction_summary(const PredictedProgram& program) {
     text += fmt::format("; expected error {:.3f} mm rms, {:.3f} mm at most",
                         std::sqrt(squares / known), most);
   text += "\n";
-  for (const std::string& note : program.notes) text += "note: " + note + "\n";
+  for (const std::string& note : cam::counted(program.notes)) text += "note: " + note + "\n";
   return text + left;
 }
 

@@ -95,6 +95,8 @@ std::string facts(const CorrectedProgram& program) {
       {{"Expected error before", figures(program, &ReceiptRow::error_before_mm)}},
       {{"Expected error after", figures(program, &ReceiptRow::error_after_mm)}},
   };
+  for (const std::string& one : program.contradictions)
+    rows.insert(rows.begin(), {{"Contradiction", html_text(one)}});
   for (const std::string& note : program.notes) rows.push_back({{"Note", html_text(note)}});
   return html_table({"facts", {}, rows});
 }
@@ -106,11 +108,12 @@ std::string targets(const CorrectedProgram& program) {
     const std::string said =
         row.message +
         (row.suggestion.empty() ? "" : (row.message.empty() ? "" : "; ") + row.suggestion);
-    rows.push_back({{html_text(fmt::format("{}:{}", row.file, row.line)), html_text(row.name),
-                     html_text(row.motion), html_text(row.tool), html_text(row.frame),
-                     html_text(row.status), mm(row.error_before_mm), mm(row.error_after_mm),
-                     mm(row.sigma_mm), mm(row.rounding_mm), html_text(said)},
-                    row.corrected() ? row.status : "left"});
+    rows.push_back(
+        {{html_text(fmt::format("{}:{}", row.file, row.line)), html_text(shown_name(row)),
+          html_text(row.motion), html_text(row.tool), html_text(row.frame), html_text(row.status),
+          mm(row.error_before_mm), mm(row.error_after_mm), mm(row.sigma_mm), mm(row.rounding_mm),
+          html_text(said)},
+         row.corrected() ? row.status : "left"});
   }
   return html_table({"targets",
                      {"place", "name", "motion", "tool", "frame", "status", "before, mm",
@@ -136,7 +139,7 @@ ordered_json points(const CorrectedProgram& program) {
     if (i % step != 0 && (row.status == "ok" || all.size() >= 2 * kMostPoints)) continue;
     all.push_back({to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z()),
                    number(row.error_before_mm), number(row.error_after_mm), row.status,
-                   fmt::format("{} {}:{}", row.name, row.file, row.line)});
+                   fmt::format("{} {}:{}", shown_name(row), row.file, row.line)});
   }
   return all;
 }
