@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "clients/cam/short_names.h"
 #include "clients/cli/text/receipt_page_html.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
