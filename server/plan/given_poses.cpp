@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "server/plan/approach.h"
+#include "server/plan/clearance.h"
 #include "server/plan/plan.h"
 
 namespace trammel {
@@ -32,6 +33,22 @@ Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given,
   return pose;
 }
 
+/// Refuses a pose where the arm touches a stated obstacle, or does before it is approached.
+Status require_clear(const Cell& cell, const PlannedPose& pose, const CommandedPose& given,
+                     const std::string& where) {
+  const Clearance clearance(cell, pose.context.tool);
+  for (const JointVector& q : {pose.context.q, pose.bump}) {
+    if (const auto touch = clearance.touch_at(q))
+      return refused("pose {}: {}", given.pose_id, in_words(*touch, cell.robot))
+          .in(where)
+          .at_row(given.row)
+          .of("pose_id")
+          .with_text(given.pose_id)
+          .next("leave it out, or state the obstacles of the cell file as they are");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Plan> plan_of(const Cell& cell, const JointList& list) {
@@ -39,8 +56,10 @@ Result<Plan> plan_of(const Cell& cell, const JointList& list) {
   for (const CommandedPose& given : list.poses) {
     const auto number = static_cast<int>(plan.poses.size());
     PlannedPose pose = TRY(planned_pose(cell.robot, given, number, list.where));
+    TRY(require_clear(cell, pose, given, list.where));
     plan.poses.push_back(std::move(pose));
   }
+  plan.clear_of = obstacles_in_words(cell);
   plan.draw.drawn = plan.draw.kept = static_cast<int>(plan.poses.size());
   return plan;
 }

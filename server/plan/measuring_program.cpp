@@ -46,6 +46,11 @@ std::string comment(const std::string& sign, std::string text) {
   return (sign + " " + text).substr(0, kLineLength - 4);
 }
 
+/// What the arm was kept clear of, for the one who starts the program.
+std::string clear_remark(const Plan& plan) {
+  return plan.clear_of.empty() ? "no obstacle was looked at" : "poses clear of " + plan.clear_of;
+}
+
 /// The six axes among the joints, and the rail.
 struct Axes {
   std::vector<int> turning;
@@ -171,6 +176,7 @@ Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const Program
   std::string text = fmt::format("MODULE {}\n", module_name(options.name));
   text +=
       "  " + comment("!", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
+  text += "  " + comment("!", clear_remark(plan)) + "\n";
   text += fmt::format("  CONST num trammel_wait:={:g};\n", options.wait_s);
   text += "  CONST speeddata trammel_fast:=[200,20,200,20];\n";
   text += "  CONST speeddata trammel_slow:=[20,2,20,2];\n";
@@ -211,6 +217,7 @@ Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOp
   std::string text = fmt::format("&ACCESS RVP\n&REL 1\nDEF {} ( )\n", options.name);
   text +=
       "  " + comment(";", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
+  text += "  " + comment(";", clear_remark(plan)) + "\n";
   text += "  EXT BAS (BAS_COMMAND :IN,REAL :IN)\n";
   text += "  DECL REAL TRAMMEL_WAIT\n";
   text += "  BAS (#INITMOV,0)\n";
@@ -245,6 +252,7 @@ Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const Program
   }
   FanucText text(axes, options.fanuc_tool);
   text.remark(fmt::format("{} poses for {}", plan.poses.size(), robot.name()));
+  text.remark(clear_remark(plan));
   text.line("UFRAME_NUM=0");
   text.line(fmt::format("UTOOL_NUM={}", options.fanuc_tool));
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
@@ -270,8 +278,9 @@ Result<std::string> to_urscript(const Chain& robot, const Plan& plan,
   constexpr double kFast = 0.35, kSlow = 0.035;  // rad/s
   const std::string name = module_name(options.name);
   std::string text =
-      fmt::format("def {}():\n  {}\n", name,
-                  comment("#", fmt::format("{} poses for {}", plan.poses.size(), robot.name())));
+      fmt::format("def {}():\n  {}\n  {}\n", name,
+                  comment("#", fmt::format("{} poses for {}", plan.poses.size(), robot.name())),
+                  comment("#", clear_remark(plan)));
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
     if (const std::string change = change_before(plan, i); !change.empty()) {
       text += fmt::format("  popup(\"{}\", blocking=True)\n", comment("", change).substr(1));

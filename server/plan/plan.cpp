@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "server/plan/approach.h"
+#include "server/plan/clearance.h"
 #include "server/plan/contact_posture.h"
 #include "server/plan/optimal_design.h"
 #include "server/plan/visibility.h"
@@ -68,6 +69,7 @@ class Filter {
       filter.X_FT_.push_back(cell.tools.at(tool).value_or(Pose::Identity()));
       Visibility visibility = TRY(Visibility::of(cell, tool));
       filter.visibility_.push_back(std::move(visibility));
+      filter.clearance_.emplace_back(cell, tool);
     }
     return filter;
   }
@@ -84,6 +86,11 @@ class Filter {
     }
     const auto inside = [&](const JointVector& v) { return inside_workspace(v); };
     if (!std::all_of(visited.begin(), visited.end(), inside)) return ++count.outside, false;
+    const auto touches = [&](const JointVector& v) {
+      return std::any_of(clearance_.begin(), clearance_.end(),
+                         [&](const Clearance& one) { return one.touch_at(v).has_value(); });
+    };
+    if (std::any_of(visited.begin(), visited.end(), touches)) return ++count.touching, false;
     const auto sees = [&](const Visibility& visibility) { return visibility.sees(q); };
     if (!std::all_of(visibility_.begin(), visibility_.end(), sees)) return ++count.unseen, false;
     return ++count.kept, true;
@@ -106,6 +113,7 @@ class Filter {
   const Cell& cell_;
   std::vector<Pose> X_FT_;
   std::vector<Visibility> visibility_;
+  std::vector<Clearance> clearance_;
 };
 
 struct Drawn {
@@ -148,10 +156,10 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
   if (count.kept < needed) {
     return refused(
                "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are "
-               "needed; {} leave the workspace, {} are out of the tracker's sight, {} are beyond a "
-               "joint limit or too near to it to be approached",
-               cell.name, count.drawn, count.kept, needed, count.outside, count.unseen,
-               count.no_way)
+               "needed; {} leave the workspace, {} touch a stated obstacle, {} are out of the "
+               "tracker's sight, {} are beyond a joint limit or too near to it to be approached",
+               cell.name, count.drawn, count.kept, needed, count.outside, count.touching,
+               count.unseen, count.no_way)
         .of("count")
         .beyond(count.kept, needed);
   }
@@ -393,7 +401,9 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
   return may;
 }
 
-Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
+namespace {
+
+Result<Plan> chosen_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
   TRY(check_count(options));
   if (options.criterion == PlanCriterion::kCheck && options.bidirectional) {
     return failure(ErrorCode::kUsage, "a check takes each pose once").of("--bidirectional");
@@ -428,6 +438,14 @@ Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOption
       kLargestDesignFactor));
   if (check) return planned_check(planning, options, filter, candidates);
   return designed(planning, options, filter, candidates, latin_hypercube);
+}
+
+}  // namespace
+
+Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
+  Plan plan = TRY(chosen_plan(cell, options));
+  plan.clear_of = obstacles_in_words(*cell);
+  return plan;
 }
 
 }  // namespace trammel

@@ -67,9 +67,10 @@ struct PlanOptions {
 /// The fate of the candidates drawn; each counts for the first reason against it.
 struct DrawCount {
   int drawn = 0;
-  int outside = 0;  ///< the pose, or its approach, is outside the workspace
-  int unseen = 0;   ///< not in sight of the tracker
-  int no_way = 0;   ///< beyond a joint limit, or too near to one to be approached
+  int outside = 0;   ///< the pose, or its approach, is outside the workspace
+  int touching = 0;  ///< a link touches a stated obstacle there, or on its approach's pose
+  int unseen = 0;    ///< not in sight of the tracker
+  int no_way = 0;    ///< beyond a joint limit, or too near to one to be approached
   int kept = 0;
 };
 
@@ -97,6 +98,9 @@ struct Plan {
   /// For kCheck: the smallest change of each cause that this plan shows with 95 % chance, given the
   /// tracker's noise.
   std::vector<SmallestEffect> smallest;
+  /// obstacles_in_words(): what the arm keeps clear of at all poses and their approaches; empty: no
+  /// obstacle is stated, and nothing was looked at.
+  std::string clear_of = {};
 };
 
 /// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach:

@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/compensate/accuracy.h"
+#include "server/robot/arm_shape.h"
 
 namespace trammel {
 
@@ -28,25 +29,15 @@ ordered_json error(const Vector3& e_B) {
   return {fine(e_B.x()), fine(e_B.y()), fine(e_B.z())};
 }
 
-/// The corners of the nominal arm: along the axis, then along the link, of each DH row; the tool
-/// last.
+/// The corners of the nominal arm, from the base to the tool.
 ordered_json arm(const CompensatedModel& model, const PoseContext& context) {
-  ordered_json corners = {point(Vector3::Zero())};
-  Pose X = Pose::Identity();
-  const auto corner = [&](const Eigen::Vector3d& along) {
-    if (along.norm() < 1e-6) return;
-    X.translate(along);
-    corners.push_back(point(X.translation()));
-  };
-  for (const LinkGeometry& link : model.cell().robot.links_at(context.q)) {
-    X.rotate(Eigen::AngleAxisd(link.theta, Vector3::UnitZ()));
-    corner(link.d * Vector3::UnitZ());
-    corner(link.a * Vector3::UnitX());
-    X.rotate(Eigen::AngleAxisd(link.alpha, Vector3::UnitX()))
-        .rotate(Eigen::AngleAxisd(link.beta, Vector3::UnitY()));
-  }
   const auto tool = model.parts().physics.tools.find(context.tool);
-  if (tool != model.parts().physics.tools.end()) corner(tool->second.translation());
+  const bool known = tool != model.parts().physics.tools.end();
+  ordered_json corners = {point(Vector3::Zero())};
+  for (const ArmPart& part :
+       arm_parts(model.cell().robot, context.q,
+                 known ? std::optional<Vector3>(tool->second.translation()) : std::nullopt))
+    corners.push_back(point(part.to_B));
   return corners;
 }
 
@@ -73,13 +64,39 @@ Shell shell_of(const std::vector<Vector3>& places) {
   return shell;
 }
 
-ordered_json shell_json(const std::vector<PoseContext>& range, const CompensatedModel& model) {
+/// Nominal places of the tool, in B.
+std::vector<Vector3> tool_places(const std::vector<PoseContext>& range,
+                                 const CompensatedModel& model) {
   const PhysicalModel& physics = model.parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   std::vector<Vector3> places;
   for (const PoseContext& context : range)
     places.push_back(X_BW * physics.nominal_pose_W(context).translation());
-  const Shell shell = shell_of(places);
+  return places;
+}
+
+/// The region of the domain in numbers.
+ordered_json promised_json(const std::vector<Vector3>& places, const Shell& shell) {
+  Vector3 lower = places.front(), upper = places.front();
+  for (const Vector3& p : places) {
+    lower = lower.cwiseMin(p);
+    upper = upper.cwiseMax(p);
+  }
+  double radius = 0, squares = 0;
+  for (const std::vector<double>& ring : shell.radius) {
+    for (const double r : ring) {
+      radius = std::max(radius, r);
+      squares += r * r;
+    }
+  }
+  const double sector = kPi / kSectors * (shell.high - shell.low) / kRings;
+  return {{"lower", point(lower)},
+          {"upper", point(upper)},
+          {"radius_mm", std::round(to_mm(radius))},
+          {"volume_m3", squares * sector}};
+}
+
+ordered_json shell_json(const Shell& shell) {
   ordered_json rings = ordered_json::array();
   for (int r = 0; r < kRings; ++r) {
     ordered_json ring = ordered_json::array();
@@ -130,7 +147,12 @@ ordered_json scene_json(const CompensatedModel& model, const ShownPoses& shown) 
   ordered_json poses = measured(model, shown);
   const bool known = !poses.empty();
   if (!known) poses = expected(model, poses_of_domain(model, kUnmeasured));
-  ordered_json scene = {{"poses", poses}, {"shell", shell_json(range, model)}, {"measured", known}};
+  const std::vector<Vector3> places = tool_places(range, model);
+  const Shell shell = shell_of(places);
+  ordered_json scene = {{"poses", poses},
+                        {"shell", shell_json(shell)},
+                        {"promised", promised_json(places, shell)},
+                        {"measured", known}};
   if (const auto& box = model.parts().measured)
     scene["box"] = {point(box->lower), point(box->upper)};
   return scene;

@@ -16,8 +16,9 @@ constexpr std::size_t kHashDigits = 32;
 
 /// Keys of a cell file that decide no number: the robot file counts by its content, and the others
 /// are for people.
-const std::set<std::string> kWithoutNumbers = {"robot", "robot_confirmed", "serial_number",
-                                               "instrument", "operator"};
+const std::set<std::string> kWithoutNumbers = {
+    "robot",    "robot_confirmed", "serial_number", "instrument", "instrument_certificate",
+    "operator", "obstacles"};
 
 /// `0.10` and `1e-1` are one number.
 std::string spelled(const std::string& scalar) {

@@ -10,6 +10,7 @@
 #include "server/base/units.h"
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
+#include "server/robot/cell_obstacles.h"
 #include "server/robot/cell_papers.h"
 #include "server/robot/cell_row.h"
 #include "server/robot/cell_rules.h"
@@ -126,6 +127,18 @@ SessionRule read_sessions(const YamlMap& map) {
   return {};
 }
 
+Workspace read_box(const YamlMap& box) {
+  box.only({"lower", "upper"});
+  const Workspace read{read_vector(box, "lower") * from_mm(1),
+                       read_vector(box, "upper") * from_mm(1)};
+  for (int k = 0; k < 3; ++k) {
+    if (read.lower(k) > read.upper(k))
+      box.refuse("lower", refused("{:g} in {}, above upper", to_mm(read.lower(k)), "xyz"[k])
+                              .beyond(to_mm(read.lower(k)), to_mm(read.upper(k))));
+  }
+  return read;
+}
+
 void read_surroundings(const YamlMap& map, Cell& cell) {
   map.attempt([&] {
     if (!map.is_null("base")) cell.X_WB = read_pose(map.map("base"));
@@ -150,10 +163,7 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
   });
   map.attempt([&] {
     if (!map.has("workspace_mm")) return;
-    const YamlMap box = map.map("workspace_mm");
-    box.only({"lower", "upper"});
-    cell.workspace =
-        Workspace{read_vector(box, "lower") * from_mm(1), read_vector(box, "upper") * from_mm(1)};
+    cell.workspace = read_box(map.map("workspace_mm"));
   });
 }
 
@@ -199,6 +209,35 @@ CellRules read_rules(const YamlMap& map) {
   return rules;
 }
 
+/// `links`: the robot's joints; the radii are of their links and of the tool.
+std::optional<Obstacles> read_obstacles(const YamlMap& cell, int links) {
+  if (cell.is_null("obstacles")) return std::nullopt;
+  const YamlMap map = cell.map("obstacles");
+  map.only({"floor_mm", "mounting", "boxes", "link_radii_mm"});
+  Obstacles around;
+  map.attempt([&] {
+    if (!map.is_null("floor_mm")) around.floor = map.number("floor_mm") * from_mm(1);
+  });
+  map.attempt([&] {
+    if (!map.is_null("mounting"))
+      around.boxes.push_back({"the mounting", read_box(map.map("mounting")), true});
+  });
+  map.attempt([&] {
+    if (map.is_null("boxes")) return;
+    const YamlMap boxes = map.map("boxes");
+    for (const std::string& name : boxes.keys())
+      boxes.attempt([&] { around.boxes.push_back({name, read_box(boxes.map(name)), false}); });
+  });
+  map.attempt([&] {
+    if (map.is_null("link_radii_mm")) return;
+    for (const double mm : map.numbers("link_radii_mm", static_cast<std::size_t>(links) + 1)) {
+      if (!(mm >= 0)) map.refuse("link_radii_mm", refused("{:g}, below 0", mm).beyond(mm, 0));
+      around.link_radius.push_back(mm * from_mm(1));
+    }
+  });
+  return around;
+}
+
 CellPapers read_papers(const YamlMap& map) {
   CellPapers papers;
   const auto read = [&](const char* key, std::string* text) {
@@ -208,6 +247,7 @@ CellPapers read_papers(const YamlMap& map) {
   };
   read("serial_number", &papers.serial_number);
   read("instrument", &papers.instrument);
+  read("instrument_certificate", &papers.instrument_certificate);
   read("operator", &papers.operator_name);
   return papers;
 }
@@ -222,17 +262,30 @@ std::optional<RobotConfirmation> read_confirmation(const YamlMap& map) {
 }
 
 Cell read_cell_map(const YamlMap& map) {
-  map.only({"version",         "cell",
-            "robot",           "base",
-            "gravity",         "tools",
-            "payloads",        "tracker",
-            "model",           "joint_ranges_deg",
-            "workspace_mm",    "sessions",
-            "tolerance_mm",    "step_limit_mm",
-            "prior",           "controller_compensates",
-            "anchors",         "serial_number",
-            "instrument",      "operator",
-            "robot_confirmed", "axes"});
+  map.only({"version",
+            "cell",
+            "robot",
+            "base",
+            "gravity",
+            "tools",
+            "payloads",
+            "tracker",
+            "model",
+            "joint_ranges_deg",
+            "workspace_mm",
+            "sessions",
+            "tolerance_mm",
+            "step_limit_mm",
+            "prior",
+            "controller_compensates",
+            "anchors",
+            "serial_number",
+            "instrument",
+            "operator",
+            "robot_confirmed",
+            "axes",
+            "instrument_certificate",
+            "obstacles"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
@@ -254,6 +307,7 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] { read_model(map, cell); });
   static_cast<void>(read_rules(map));
   static_cast<void>(read_papers(map));
+  static_cast<void>(read_obstacles(map, cell.robot.size()));
   map.attempt([&] { static_cast<void>(read_confirmation(map)); });
   return cell;
 }
@@ -343,6 +397,12 @@ Result<CellRules> rules_of(const Cell& cell) {
 Result<CellPapers> papers_of(const Cell& cell) {
   if (cell.cell_yaml.empty()) return CellPapers{};
   return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_papers(map); });
+}
+
+Result<std::optional<Obstacles>> obstacles_of(const Cell& cell) {
+  if (cell.cell_yaml.empty()) return std::optional<Obstacles>();
+  return read_yaml(cell.cell_yaml, cell.name,
+                   [&](const YamlMap& map) { return read_obstacles(map, cell.robot.size()); });
 }
 
 std::optional<RobotConfirmation> confirmation_of(const Cell& cell) {

@@ -134,23 +134,37 @@ std::string check_text(const Plan& plan) {
       to_mm(*hardest->rms), in_words(hardest->cause));
 }
 
+/// What the poses keep clear of, and what nobody looked at.
+std::string clear_text(const Plan& plan) {
+  return plan.clear_of.empty()
+             ? "Nothing that the arm could touch is stated (obstacles of the cell file): look at "
+               "the "
+               "poses with trammel view before they run\n"
+             : fmt::format(
+                   "Every pose and its approach is clear of {}; the ways between poses were "
+                   "not looked at\n",
+                   plan.clear_of);
+}
+
 std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
   const DrawCount& draw = plan.draw;
   if (!arguments.from.empty()) {
     return fmt::format("{} poses for cell {} in {}\n", plan.poses.size(), cell.name,
-                       arguments.output);
+                       arguments.output) +
+           clear_text(plan);
   }
   std::string text = fmt::format(
-      "{} poses for cell {} in {}\n{} drawn, {} kept: {} outside the workspace, {} out of sight, "
+      "{} poses for cell {} in {}\n{} drawn, {} kept: {} outside the workspace, {}{} out of sight, "
       "{} too near to a joint limit\n",
       plan.poses.size(), cell.name, arguments.output, draw.drawn, draw.kept, draw.outside,
+      plan.clear_of.empty() ? "" : fmt::format("{} touching an obstacle, ", draw.touching),
       draw.unseen, draw.no_way);
   if (arguments.options.criterion == PlanCriterion::kObservability) {
     text += fmt::format("log det of the information: {:.2f}, of a Latin hypercube {:.2f}\n",
                         plan.criterion, plan.criterion_of_latin_hypercube);
   }
   if (plan.separation) text += separation_text(arguments, *plan.separation);
-  return text + check_text(plan);
+  return text + clear_text(plan) + check_text(plan);
 }
 
 ordered_json as_json(const Separability& separability) {
@@ -171,6 +185,8 @@ ordered_json as_json(const Cell& cell, const PlanArguments& arguments, const Pla
                        {"drawn", draw.drawn},
                        {"kept", draw.kept},
                        {"outside_workspace", draw.outside},
+                       {"touching_obstacle", draw.touching},
+                       {"clear_of", plan.clear_of},
                        {"out_of_sight", draw.unseen},
                        {"near_joint_limit", draw.no_way}};
   if (arguments.check > 0) {
