@@ -3,6 +3,7 @@
 #include <string>
 
 #include "idl/limits.h"
+#include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -241,8 +242,8 @@ Result<ReadModelsReply> Handlers::fleet() const {
     cells.push_back(std::move(entry));
   }
   ReadModelsReply reply;
-  reply.text(
-      fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  reply.text(fleet_json(cells, unix_now())
+                 .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   TRY(check_fits("the fleet", reply.text().size()));
   return reply;
 }

@@ -23,6 +23,9 @@ enum class HealthVerdict {
 /// The default if a cell file states none.
 inline constexpr double kUsualTolerance = 1e-4;  // m
 
+/// s: a robot is checked that often, as long as no checks tell how fast it drifts.
+inline constexpr std::int64_t kUsualInterval = 30 * 86400;
+
 struct HealthOptions {
   double tolerance = kUsualTolerance;  ///< m, of an effect over the working poses, rms
   bool new_tool =
@@ -56,6 +59,15 @@ struct SeenChange {
   std::vector<SingleCause> could_also_be = {};
 };
 
+/// A pose of a check against the model.
+struct PoseAtCheck {
+  std::string pose_id;
+  Vector3 place_B = Vector3::Zero();  ///< m, as the model predicts it
+  Vector3 off_B = Vector3::Zero();    ///< m: measured - predicted, base (and tool) refitted
+  double expected = 0;                ///< m, rms of |off_B| of a healthy robot
+  bool suspect = false;               ///< it fits nothing, and was left out
+};
+
 struct HealthCheck {
   HealthVerdict verdict = HealthVerdict::kCannotTell;
   std::string sentence;  ///< why, for people
@@ -68,12 +80,14 @@ struct HealthCheck {
       would_have_seen;  ///< m: the largest of `smallest`; empty where an effect would not be seen
   std::vector<SmallestEffect> smallest;  ///< the largest first
   std::vector<SeenChange> changed;
-  std::vector<std::string> suspects;  ///< pose ids that fit nothing, left out
+  std::vector<PoseAtCheck> at_poses = {};  ///< in the order of the batch
+  std::vector<std::string> suspects;       ///< pose ids that fit nothing, left out
   std::vector<CauseNotAsked> not_asked;
   std::string model;                    ///< id of the one that it was held against
   std::optional<DriftSeen> drift;       ///< the drift by this check; empty: it shows none
   std::optional<DriftRate> drift_rate;  ///< by this check and the earlier ones
-  std::string due;          ///< date of the next check (ISO 8601, UTC); empty: cannot be said
+  std::string due;  ///< date of the next check (ISO 8601, UTC): by the drift, or kUsualInterval
+                    ///< later while too few checks show it; empty: it changed, or times are unknown
   std::string due_because;  ///< the basis of the date, or the reason why there is none
 };
 

@@ -9,6 +9,7 @@
 #include "server/base/unix_time.h"
 #include "server/error_sources/cause_words.h"
 #include "server/http/readiness.h"
+#include "server/report/cell_needs.h"
 #include "server/report/history.h"
 #include "server/report/html.h"
 #include "server/report/model_page.h"
@@ -89,11 +90,60 @@ InMemory in_memory(const Watched& server) {
   return models;
 }
 
-HtmlRow fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now) {
-  HtmlRow row{{html_link(cell_address(one.cell), one.cell), state_of(one)},
+/// The last check of a cell; empty: none, or the record is away.
+std::string last_check_of(const Watched& server, const std::string& cell) {
+  const auto checks = server.store.health_checks(cell, 0, 1);
+  return checks && !checks->empty() ? checks->back().findings : "";
+}
+
+const ServedModel* model_in(const InMemory& models, const std::string& cell) {
+  const auto found = models.find(cell);
+  return found == models.end() ? nullptr : found->second.get();
+}
+
+CellNeed need_of_cell(const Watched& server, const CellReadiness& one, const InMemory& models,
+                      std::int64_t now) {
+  const ServedModel* model = model_in(models, one.cell);
+  if (model == nullptr && !one.is_dark())
+    return {CellNeed::Urgency::kFine, "It is answered for; its model is loaded when it is asked.",
+            ""};
+  const auto kept_out = server.trainer.quarantined(one.cell);
+  return need_of({.cell = one.cell,
+                  .model = model == nullptr ? nullptr : &model->model,
+                  .dark_because = one.is_dark() ? one.why : "",
+                  .last_check = model == nullptr ? "" : last_check_of(server, one.cell),
+                  .in_training = one.state == CellReadiness::State::kInTraining,
+                  .kept_out = kept_out ? kept_out->size() : 0,
+                  .now = now});
+}
+
+std::string need_html(const CellNeed& need) {
+  return need_badge(to_text(need.urgency)) + html_text(need.sentence) +
+         (need.action.empty() ? "" : " <b>To do:</b> " + html_text(need.action));
+}
+
+/// `2 of 3 cells are fine; cell-7 needs something now.`
+std::string verdict_on(const std::vector<std::pair<std::string, CellNeed>>& needs) {
+  std::vector<std::string> now, soon;
+  for (const auto& [cell, need] : needs) {
+    if (need.urgency == CellNeed::Urgency::kNow) now.push_back(cell);
+    if (need.urgency == CellNeed::Urgency::kSoon) soon.push_back(cell);
+  }
+  const std::size_t fine = needs.size() - now.size() - soon.size();
+  std::string text = needs.size() == 1 && fine == 1
+                         ? "Its cell is fine"
+                         : fmt::format("{} of {} cell{} {} fine", fine, needs.size(),
+                                       needs.size() == 1 ? "" : "s", fine == 1 ? "is" : "are");
+  if (!now.empty()) text += fmt::format("; act now: {}", fmt::join(now, ", "));
+  if (!soon.empty()) text += fmt::format("; see to: {}", fmt::join(soon, ", "));
+  return text + ".";
+}
+
+HtmlRow fleet_row(const CellReadiness& one, const CellNeed& need, const InMemory& models,
+                  std::int64_t now) {
+  HtmlRow row{{html_link(cell_address(one.cell), one.cell), need_html(need), state_of(one)},
               one.is_dark() ? "dark" : "served"};
-  const auto found = models.find(one.cell);
-  const ServedModel* model = found == models.end() ? nullptr : found->second.get();
+  const ServedModel* model = model_in(models, one.cell);
   const int version = model == nullptr ? one.version : model->version;
   row.cells.push_back(
       version == 0 ? "–" : html_link(model_address(one.cell, version), std::to_string(version)));
@@ -249,17 +299,22 @@ Result<CompensatedModel> model_of(const Watched& server, const std::string& cell
 }  // namespace
 
 ServicePage fleet_page(const Watched& server) {
-  const std::vector<CellReadiness> cells = cells_readiness(server);
+  std::vector<CellReadiness> cells = cells_readiness(server);
   const InMemory models = in_memory(server);
-  const auto dark =
-      std::count_if(cells.begin(), cells.end(), [](const auto& one) { return one.is_dark(); });
+  const std::int64_t today = unix_now();
+  std::vector<std::pair<std::string, CellNeed>> needs;
+  std::map<std::string, CellNeed> by_cell;
+  for (const CellReadiness& one : cells) {
+    needs.emplace_back(one.cell, need_of_cell(server, one, models, today));
+    by_cell[one.cell] = needs.back().second;
+  }
+  std::stable_sort(cells.begin(), cells.end(), [&](const CellReadiness& a, const CellReadiness& b) {
+    return by_cell[a.cell].urgency > by_cell[b.cell].urgency;
+  });
   std::vector<HtmlRow> rows;
-  for (const CellReadiness& one : cells) rows.push_back(fleet_row(one, models, unix_now()));
-  const std::string verdict =
-      dark == 0 ? cells.size() == 1 ? "Its cell is answered for."
-                                    : fmt::format("All {} cells are answered for.", cells.size())
-                : fmt::format("{} of {} cells {} dark: nobody gets an answer for {}.", dark,
-                              cells.size(), dark == 1 ? "is" : "are", dark == 1 ? "it" : "them");
+  for (const CellReadiness& one : cells)
+    rows.push_back(fleet_row(one, by_cell[one.cell], models, today));
+  const std::string verdict = html_text(verdict_on(needs));
   const Movement movement = server.movement();
   const std::string still =
       movement.still.empty()
@@ -275,8 +330,8 @@ ServicePage fleet_page(const Watched& server) {
                                html_link("/fleet", "Servers"), html_text(server.server_id),
                                html_text(server.program_version), kLiveAgain)) +
       troubles_of(server) +
-      html_section("Cells", table({"cell", "state", "version", "trained (UTC)", "age of its data",
-                                   "held-out rms, mm"},
+      html_section("Cells", table({"cell", "what it needs", "state", "version", "trained (UTC)",
+                                   "age of its data", "held-out rms, mm"},
                                   rows));
   return {"Cells of " + server.server_id, body, kLiveAgain};
 }
@@ -295,7 +350,8 @@ Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
       "Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>",
                          now.is_dark() ? "Dark" : "Answered for", state_of(now), report,
                          html_link(cell_address(cell) + "/history", "History of its parameters")) +
-                 last_of(lately, JobKind::kCheck) + last_of(lately, JobKind::kDiagnose));
+                 "<p>" + need_html(need_of_cell(server, now, in_memory(server), unix_now())) +
+                 "</p>" + last_of(lately, JobKind::kCheck) + last_of(lately, JobKind::kDiagnose));
   add_section(&body, "Versions", version_table(server, cell));
   add_section(&body, "Batches that are kept out", quarantine_table(server, cell));
   add_section(&body, "Jobs", job_table(server, cell));
@@ -337,8 +393,8 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
 
 Result<std::string> model_report(const Watched& server, const std::string& cell, int version) {
   TRY(check_served(server, cell));
-  return model_of(server, cell, version).map([](const CompensatedModel& model) {
-    return model_page(model, std::nullopt);
+  return model_of(server, cell, version).map([&](const CompensatedModel& model) {
+    return model_page(model, std::nullopt, last_check_of(server, cell));
   });
 }
 
@@ -370,7 +426,8 @@ Result<std::string> history_report(const Watched& server, const std::string& cel
   }
   if (const auto trail = server.store.audit({cell, 0, 10 * kEvents})) {
     for (const AuditRow& row : trail->rows)
-      history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+      history.events.push_back(
+          {row.at, row.what, row.subject, row.why, row.who, row.before, row.after});
   }
   return history_page(history);
 }

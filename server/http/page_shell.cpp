@@ -34,12 +34,13 @@ constexpr std::string_view kWayBackStyle = R"(
   @media print { nav.service { display: none; } }
 )";
 
-std::string way_back(const std::string& cell) {
+std::string way_back(const std::string& cell, const std::string& last_check = "") {
   std::string links =
       html_link("/", "Cells") + html_link("/jobs", "Jobs") + html_link("/fleet", "Servers");
   if (!cell.empty())
     links +=
         html_link(cell_address(cell), cell) + html_link(cell_address(cell) + "/history", "History");
+  if (!last_check.empty()) links += html_link(last_check, "Last check");
   return "<nav class=\"service\">" + links + "</nav>";
 }
 
@@ -52,9 +53,11 @@ std::string inserted(std::string page, std::string_view mark, const std::string&
   return page.insert(behind ? at + mark.size() : at, what);
 }
 
-std::string with_way_back(const std::string& page, const std::string& cell) {
+std::string with_way_back(const std::string& page, const std::string& cell,
+                          const std::string& last_check = "") {
   const std::string style = fmt::format("<style>{}</style>\n", kWayBackStyle);
-  return inserted(inserted(page, "</head>", style, false), "<body>", "\n" + way_back(cell), true);
+  return inserted(inserted(page, "</head>", style, false), "<body>",
+                  "\n" + way_back(cell, last_check), true);
 }
 
 const PageInserts& our_inserts() {
@@ -95,9 +98,10 @@ HttpReply page_reply(const ServicePage& page, int code) {
       kPolicy);
 }
 
-HttpReply report_reply(const std::string& page, const std::string& cell) {
+HttpReply report_reply(const std::string& page, const std::string& cell,
+                       const std::string& last_check) {
   static const std::string kPolicy = content_policy(our_inserts());
-  return html_reply(200, with_way_back(page, cell), kPolicy);
+  return html_reply(200, with_way_back(page, cell, last_check), kPolicy);
 }
 
 HttpReply stored_page_reply(const std::string& page, const std::string& cell) {

@@ -17,8 +17,10 @@ struct ServicePage {
 };
 [[nodiscard]] HttpReply page_reply(const ServicePage& page, int code = 200);
 
-/// A separate page (a model, a history), with links to the other pages above it.
-[[nodiscard]] HttpReply report_reply(const std::string& page, const std::string& cell);
+/// A separate page (a model, a history), with links to the other pages above it. `last_check`: the
+/// address of a model's last check; empty: none.
+[[nodiscard]] HttpReply report_reply(const std::string& page, const std::string& cell,
+                                     const std::string& last_check = "");
 /// report_reply() for a page that an earlier version of the program may have written. Its scripts
 /// run, but without access to anything else.
 [[nodiscard]] HttpReply stored_page_reply(const std::string& page, const std::string& cell);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <nlohmann/json.hpp>
 
 #include "server/http/live_pages.h"
 #include "server/http/page_shell.h"
@@ -42,11 +43,36 @@ std::optional<Number> number_in(const std::string& word) {
   return number;
 }
 
+/// The version of the model that a check was held against; 0: it is no longer on record.
+int version_of(const Watched& server, const std::string& cell, const std::string& findings) {
+  const auto check = nlohmann::json::parse(findings, nullptr, false);
+  if (!check.is_object() || !check.contains("model") || !check["model"].is_string()) return 0;
+  const auto models = server.store.models(cell);
+  if (!models) return 0;
+  for (auto one = models->rbegin(); one != models->rend(); ++one)
+    if (one->id == check["model"].get<std::string>()) return one->version;
+  return 0;
+}
+
+/// `/jobs/7/findings`, of the last check of this version; empty: none.
+std::string last_check_address(const Watched& server, const std::string& cell, int version) {
+  const auto checks = server.store.health_checks(cell, 0, 1);
+  if (!checks || checks->empty() || version_of(server, cell, checks->back().findings) != version)
+    return "";
+  return fmt::format("/jobs/{}/findings", checks->back().job);
+}
+
 /// The findings of a check, with links to its cell and its job.
-HttpReply health_reply(const std::string& findings, const StoredJob& job) {
+HttpReply health_reply(const Watched& server, const std::string& findings, const StoredJob& job) {
+  const int version = version_of(server, job.cell, findings);
+  const std::string model =
+      version == 0 ? ""
+                   : html_link(fmt::format("{}/models/{}", cell_address(job.cell), version),
+                               fmt::format("Model of version {}", version)) +
+                         " · ";
   const std::string links =
-      fmt::format("<p>{} · {} · {} · {} · checked {} UTC</p>",
-                  html_link(cell_address(job.cell), "Cell " + job.cell),
+      fmt::format("<p>{} · {}{} · {} · {} · checked {} UTC</p>",
+                  html_link(cell_address(job.cell), "Cell " + job.cell), model,
                   html_link(cell_address(job.cell) + "/history", "History"),
                   html_link(fmt::format("/jobs/{}", job.id), fmt::format("Job {}", job.id)),
                   html_link(fmt::format("/jobs/{}/findings.json", job.id), "all of it as JSON"),
@@ -62,7 +88,7 @@ HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_progr
   if (!found) return refused_reply(found.error());
   if (!for_programs && !found->page.empty()) return stored_page_reply(found->page, asked->cell);
   if (!for_programs && asked->kind() == JobKind::kCheck)
-    return health_reply(found->findings, *asked);
+    return health_reply(server, found->findings, *asked);
   return {200, "application/json", found->findings};
 }
 
@@ -92,6 +118,11 @@ HttpReply Pages::of_cell(const HttpAsk& ask) {
   const auto report = [&](const Result<std::string>& page) {
     return page ? report_reply(*page, cell) : refused_reply(page.error());
   };
+  const auto model = [&](int version) {
+    const auto page = model_report(server_, cell, version);
+    return page ? report_reply(*page, cell, last_check_address(server_, cell, version))
+                : refused_reply(page.error());
+  };
   if (path.size() == 3 && path[2] == "history")
     return kept(cell_address(cell) + "/history", kForAWhile,
                 [&] { return report(history_report(server_, cell)); });
@@ -99,7 +130,7 @@ HttpReply Pages::of_cell(const HttpAsk& ask) {
   const auto version = number_in<int>(path[3]);
   if (!version) return not_there();
   return kept(fmt::format("{}/models/{}", cell_address(cell), *version), kForAWhile,
-              [&] { return report(model_report(server_, cell, *version)); });
+              [&] { return model(*version); });
 }
 
 HttpReply Pages::of_job(const HttpAsk& ask) {

@@ -20,6 +20,8 @@ find_file(CHART_JS chart.min.js PATHS /usr/share/javascript/chart.js REQUIRED NO
 trammel_embed(trammel_report chart_js ${CHART_JS})
 trammel_embed(trammel_report page_css ${CMAKE_CURRENT_SOURCE_DIR}/report/page.css)
 trammel_embed(trammel_report view3d_js ${CMAKE_CURRENT_SOURCE_DIR}/report/view3d.js)
+trammel_embed(trammel_report sort_tables_js ${CMAKE_CURRENT_SOURCE_DIR}/report/sort_tables.js)
 trammel_embed(trammel_report model_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/model_page.html)
 trammel_embed(trammel_report diagnosis_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/diagnosis_page.html)
 trammel_embed(trammel_report history_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/history_page.html)
+trammel_embed(trammel_report view_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/view_page.html)

@@ -12,5 +12,7 @@ extern const std::string_view
     model_page_html;  ///< the page of a model, with `{{...}}` where its content goes
 extern const std::string_view diagnosis_page_html;  ///< the same of a diagnosis
 extern const std::string_view history_page_html;    ///< the same of a cell through its versions
+extern const std::string_view view_page_html;       ///< the same of a cell in space
+extern const std::string_view sort_tables_js;       ///< tables that sort by a click
 
 }  // namespace trammel::embedded

@@ -3,6 +3,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
 #include "server/fleet/fleet_lines.h"
+#include "server/report/cell_needs.h"
 #include "server/report/note_json.h"
 #include "server/robot/cell_rules.h"
 
@@ -106,7 +107,7 @@ ordered_json type_json(const FleetPrior& prior, const PhysicalModel& physics) {
 
 }  // namespace
 
-ordered_json fleet_json(const std::vector<FleetEntry>& cells) {
+ordered_json fleet_json(const std::vector<FleetEntry>& cells, std::int64_t now) {
   ordered_json json = {{"cells", ordered_json::array()}, {"types", ordered_json::array()}};
   std::vector<std::string> told;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -114,6 +115,10 @@ ordered_json fleet_json(const std::vector<FleetEntry>& cells) {
     ordered_json one = {{"cell", entry.cell}};
     one["version"] = entry.version > 0 ? ordered_json(entry.version) : ordered_json(nullptr);
     one["health"] = health_of(entry.last_check);
+    one["need"] = need_json(need_of({.cell = entry.cell,
+                                     .model = entry.model ? &*entry.model : nullptr,
+                                     .last_check = entry.last_check,
+                                     .now = now}));
     if (entry.model) {
       const Chain& robot = entry.model->cell().robot;
       one["robot"] = robot.name();
@@ -133,6 +138,14 @@ ordered_json fleet_json(const std::vector<FleetEntry>& cells) {
 }
 
 namespace {
+
+/// `  Its check was due by 2026-11-20. To do: ...`; empty from a server that does not say it.
+std::string need_text(const ordered_json& cell) {
+  if (!cell.contains("need") || !cell["need"].is_object()) return "";
+  const std::string action = cell["need"].value("action", "");
+  return fmt::format("  {}{}\n", cell["need"].value("sentence", ""),
+                     action.empty() ? "" : " To do: " + action);
+}
 
 /// The lines of its budget in which it differs, at most kShownLines.
 std::string lines_text(const ordered_json& cell) {
@@ -158,7 +171,7 @@ std::string fleet_text(const ordered_json& fleet) {
                         health.is_object() ? health.value("verdict", "") : "not checked yet");
     if (health.is_object() && !health.value("due", "").empty())
       text += fmt::format(", next check {}", health.value("due", ""));
-    text += "\n";
+    text += "\n" + need_text(cell);
     if (!cell.contains("unlike_twins")) {
       text += "  no model in force\n";
     } else if (cell["unlike_twins"].is_null()) {

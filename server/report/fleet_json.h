@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -17,9 +18,11 @@ struct FleetEntry {
   std::string last_check = {};            ///< in the form of health_json(); empty: none
 };
 
-/// Cells with their last health verdicts and their unusual values among robots of their type, and
-/// the learned values of each type.
-[[nodiscard]] nlohmann::ordered_json fleet_json(const std::vector<FleetEntry>& cells);
+/// Cells with their last health verdicts, what they need (`need`, see cell_needs.h) and their
+/// unusual values among robots of their type, and the learned values of each type. `now`: Unix
+/// time, s.
+[[nodiscard]] nlohmann::ordered_json fleet_json(const std::vector<FleetEntry>& cells,
+                                                std::int64_t now);
 /// The output of fleet_json() for people.
 [[nodiscard]] std::string fleet_text(const nlohmann::ordered_json& fleet);
 

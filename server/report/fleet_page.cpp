@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/report/cell_needs.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "server/report/plain_page.h"
@@ -55,15 +56,24 @@ std::string lines_of(const ordered_json& cell) {
   return list.empty() ? "none" : "<ul>" + list + "</ul>";
 }
 
+/// `<badge> Its check was due by 2026-11-20. To do: ...`
+std::string need_of_row(const ordered_json& cell) {
+  const ordered_json& need = member(cell, "need");
+  const std::string action = text_in(need, "action");
+  if (text_in(need, "sentence").empty()) return "–";
+  return need_badge(text_in(need, "urgency")) + html_text(text_in(need, "sentence")) +
+         (action.empty() ? "" : " <b>To do:</b> " + html_text(action));
+}
+
 HtmlRow cell_row(const ordered_json& cell) {
   const std::string verdict = verdict_of(cell);
   const ordered_json& version = member(cell, "version");
   std::string model = or_dash(text_in(cell, "model"));
   if (version.is_number_integer()) model += fmt::format(" (version {})", version.get<int>());
-  return {
-      {or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model, html_text(verdict),
-       or_dash(text_in(member(cell, "health"), "due")), twins_of(cell), lines_of(cell)},
-      verdict == "changed" ? "changed" : ""};
+  return {{or_dash(text_in(cell, "cell")), or_dash(text_in(cell, "robot")), model,
+           html_text(verdict), need_of_row(cell), or_dash(text_in(member(cell, "health"), "due")),
+           twins_of(cell), lines_of(cell)},
+          verdict == "changed" ? "changed" : ""};
 }
 
 std::string types_text(const ordered_json& types) {
@@ -93,10 +103,11 @@ std::string fleet_page(const ordered_json& fleet, std::int64_t at) {
   const std::string count = fmt::format("{} robot{}", rows.size(), rows.size() == 1 ? "" : "s");
   const std::string verdict = fmt::format(
       "<p class=\"verdict\">{}: {} changed, {} not checked yet.</p>", count, changed, unchecked);
-  const std::string table = html_table({"stacks",
-                                        {"cell", "robot", "model", "health", "next check",
-                                         "among its twins", "lines of the budget that differ"},
-                                        rows});
+  const std::string table =
+      html_table({"stacks",
+                  {"cell", "robot", "model", "health", "what it needs", "next check",
+                   "among its twins", "lines of the budget that differ"},
+                  rows});
   return plain_page({.mark = {"fleet", ""},
                      .title = "Fleet",
                      .subtitle = fmt::format("{} · {}", count, shown_day(at)),

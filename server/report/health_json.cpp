@@ -164,6 +164,20 @@ ordered_json change_budget_json(const HealthCheck& check, const CheckedWith* wit
           {"sentences", std::move(sentences)}};
 }
 
+/// mm to a nanometre: no instrument sees less.
+ordered_json rounded_mm(const Vector3& v) {
+  const auto rounded = [](double m) { return std::round(to_mm(m) * 1e6) / 1e6; };
+  return {rounded(v.x()), rounded(v.y()), rounded(v.z())};
+}
+
+ordered_json pose_json(const PoseAtCheck& pose) {
+  return {{"pose_id", pose.pose_id},
+          {"xyz_mm", rounded_mm(pose.place_B)},
+          {"off_mm", rounded_mm(pose.off_B)},
+          {"expected_mm", to_mm(pose.expected)},
+          {"suspect", pose.suspect}};
+}
+
 constexpr double kMonth = 30 * 86400.0;  // s
 
 ordered_json drift_json(const DriftSeen& drift) {
@@ -224,6 +238,8 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since,
   for (const SeenChange& change : check.changed)
     json["changed"].push_back(change_json(change, since));
   json["budget"] = change_budget_json(check, with);
+  json["at_poses"] = ordered_json::array();
+  for (const PoseAtCheck& pose : check.at_poses) json["at_poses"].push_back(pose_json(pose));
   for (const SmallestEffect& smallest : check.smallest) {
     ordered_json one = cause_json(smallest.cause);
     one["effect_rms_mm"] = length_json(smallest.rms);

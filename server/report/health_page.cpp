@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "server/error_sources/spelling.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "server/report/plain_page.h"
+#include "server/report/pose_picture.h"
 
 namespace trammel {
 namespace {
@@ -100,6 +102,58 @@ std::string hardest_to_see(const json& found) {
   return rows.empty() ? "<p>Not known.</p>" : html_table({"", {"cause", "seen from, rms"}, rows});
 }
 
+std::optional<Vector3> vector_in(const json& object, const char* key) {
+  const json& numbers = list_in(object, key);
+  const bool three =
+      numbers.size() == 3 &&
+      std::all_of(numbers.begin(), numbers.end(), [](const json& n) { return n.is_number(); });
+  if (!three) return std::nullopt;
+  return Vector3(numbers[0].get<double>(), numbers[1].get<double>(), numbers[2].get<double>());
+}
+
+/// The poses drawn, and as a table, the worst first. Empty for a check that did not record them.
+std::string poses_of_check(const json& found) {
+  struct Row {
+    DrawnPose drawn;
+    std::string expected;
+  };
+  std::vector<Row> poses;
+  for (const json& one : list_in(found, "at_poses")) {
+    const auto place = vector_in(one, "xyz_mm"), off = vector_in(one, "off_mm");
+    if (!place || !off) continue;
+    const bool suspect = one.contains("suspect") && one["suspect"] == true;
+    poses.push_back({{text_in(one, "pose_id"), *place, *off, suspect}, mm_in(one, "expected_mm")});
+  }
+  if (poses.empty()) return "";
+  std::vector<DrawnPose> drawn;
+  for (const Row& one : poses) drawn.push_back(one.drawn);
+  std::stable_sort(poses.begin(), poses.end(), [](const Row& a, const Row& b) {
+    return a.drawn.off_mm.norm() > b.drawn.off_mm.norm();
+  });
+  std::vector<HtmlRow> rows;
+  for (const Row& one : poses) {
+    const Vector3& off = one.drawn.off_mm;
+    rows.push_back(
+        {{html_text(one.drawn.name), fmt::format("{:.4f}", off.x()), fmt::format("{:.4f}", off.y()),
+          fmt::format("{:.4f}", off.z()), fmt::format("{:.4f} mm", off.norm()), one.expected,
+          one.drawn.marked ? "fits nothing, left out: measure it again" : ""},
+         one.drawn.marked ? "changed" : ""});
+  }
+  return html_section("The poses",
+                      pose_picture(drawn) + html_table({"numbers flows",
+                                                        {"pose", "dx, mm", "dy, mm", "dz, mm",
+                                                         "off by", "of a healthy robot, rms", ""},
+                                                        rows}));
+}
+
+/// `<span class="badge good">healthy</span>`
+std::string badge_of(const std::string& verdict) {
+  const char* kind = verdict == "healthy" ? " good" : verdict == "changed" ? " bad" : " soon";
+  return verdict.empty()
+             ? ""
+             : fmt::format("<span class=\"badge{}\">{}</span>", kind, html_text(verdict));
+}
+
 }  // namespace
 
 std::string health_sections(const std::string& findings, const std::string& links) {
@@ -107,10 +161,10 @@ std::string health_sections(const std::string& findings, const std::string& link
   std::string verdict = text_in(found, "verdict");
   std::replace(verdict.begin(), verdict.end(), '_', ' ');
   return html_section("Verdict",
-                      fmt::format("<p class=\"verdict\">{}: {}</p>\n{}\n", html_text(verdict),
+                      fmt::format("<p class=\"verdict\">{}{}</p>\n{}\n", badge_of(verdict),
                                   html_text(text_in(found, "why")), links) +
                           figures(found)) +
-         html_section("What changed", changes(found)) +
+         html_section("What changed", changes(found)) + poses_of_check(found) +
          html_section("Hardest to see", hardest_to_see(found));
 }
 

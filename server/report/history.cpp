@@ -83,6 +83,19 @@ void put_on_record(const CompensatedModel& model, VersionOnRecord& version) {
   }
 }
 
+VersionOnRecord on_record(const CompensatedModel& model, int version) {
+  const ModelProvenance& made = model.provenance();
+  const auto& judged = model.parts().validation;
+  VersionOnRecord one{version,
+                      made.id,
+                      made.batch_id,
+                      made.trained_at,
+                      made.training_poses,
+                      judged ? std::optional(judged->compensated.rms) : std::nullopt};
+  put_on_record(model, one);
+  return one;
+}
+
 std::vector<Moved> moved_parameters(const CellHistory& history) {
   std::vector<Moved> moved;
   const VersionOnRecord* before = nullptr;
@@ -117,6 +130,8 @@ ordered_json history_json(const CellHistory& history) {
     json["events"].push_back({{"at", one.at},
                               {"what", one.what},
                               {"subject", one.subject},
+                              {"from", one.before},
+                              {"to", one.after},
                               {"why", one.why},
                               {"who", one.who}});
   }

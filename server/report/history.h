@@ -36,6 +36,9 @@ struct VersionOnRecord {
 /// Its parameters, notes and papers, from the model itself.
 void put_on_record(const CompensatedModel& model, VersionOnRecord& version);
 
+/// A model of a file as version number `version`.
+[[nodiscard]] VersionOnRecord on_record(const CompensatedModel& model, int version);
+
 /// A training, and how its model did on poses held out.
 struct TrainingOnRecord {
   std::int64_t at = 0;  ///< Unix time, s, of its end
@@ -47,6 +50,7 @@ struct TrainingOnRecord {
 struct EventOnRecord {
   std::int64_t at = 0;  ///< Unix time, s
   std::string what, subject, why, who;
+  std::string before = {}, after = {};  ///< `version 3` and `version 4`; empty: no such thing
 };
 
 /// The history of a cell, oldest first.

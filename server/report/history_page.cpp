@@ -179,14 +179,21 @@ std::string training_table(const CellHistory& history) {
       {"trainings stacks", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
 }
 
+std::string from_to(const EventOnRecord& one) {
+  if (one.before.empty() && one.after.empty()) return "";
+  return fmt::format("{} → {}", one.before.empty() ? "nothing" : one.before,
+                     one.after.empty() ? "nothing" : one.after);
+}
+
 std::string event_table(const CellHistory& history) {
   if (history.events.empty()) return "<p>None.</p>";
   std::vector<HtmlRow> rows;
   for (const EventOnRecord& one : history.events) {
     rows.push_back({{day_of(one.at), html_text(one.what), html_text(one.subject),
-                     html_text(one.why), html_text(one.who)}});
+                     html_text(from_to(one)), html_text(one.why), html_text(one.who)}});
   }
-  return html_table({"events stacks", {"when (UTC)", "what", "of what", "why", "who"}, rows});
+  return html_table(
+      {"events stacks", {"when (UTC)", "what", "of what", "from → to", "why", "who"}, rows});
 }
 
 std::string in_force_sentence(const CellHistory& history) {

@@ -8,10 +8,12 @@
 #include <nlohmann/json.hpp>
 
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/compensate/model_notes.h"
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/budget_page.h"
+#include "server/report/cell_needs.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
 #include "server/report/model_parameters.h"
@@ -103,26 +105,32 @@ std::string warnings(const CompensatedModel& model, const Evaluation& evaluation
 
 std::string figures_table(const Evaluation& evaluation) {
   if (evaluation.poses == 0) return "";
-  std::vector<HtmlRow> rows, axes;
+  std::vector<HtmlRow> rows;
   for (const auto& [level, figures] : levels_of(evaluation)) {
     std::vector<std::string> cells = {level};
-    for (const double value : {figures->rms, figures->mean, figures->p997, figures->max}) {
+    for (const double value : {figures->rms, figures->mean, figures->p997, figures->max})
       cells.push_back(fmt::format("{:.4f}", to_mm(value)));
-    }
     rows.push_back({cells});
+  }
+  return html_table(
+             {"figures", {"length of the error, mm", "rms", "mean", "99.7 %", "largest"}, rows}) +
+         "\n";
+}
+
+std::string axes_table(const Evaluation& evaluation) {
+  if (evaluation.poses == 0) return "";
+  std::vector<HtmlRow> rows;
+  for (const auto& [level, figures] : levels_of(evaluation)) {
     std::vector<std::string> along = {level};
     for (int k = 0; k < 3; ++k)
       along.push_back(fmt::format("{:.4f} ± {:.4f}", to_mm(figures->axis_mean(k)),
                                   to_mm(figures->axis_stddev(k))));
-    axes.push_back({along});
+    rows.push_back({along});
   }
   return html_table(
-             {"figures", {"length of the error, mm", "rms", "mean", "99.7 %", "largest"}, rows}) +
-         "\n" +
-         html_table(
              {"figures axes flows",
               {"along the base's axes, mm", "x: mean ± std", "y: mean ± std", "z: mean ± std"},
-              axes}) +
+              rows}) +
          "\n";
 }
 
@@ -264,8 +272,8 @@ std::string chosen_causes(const CompensatedModel::Parts& parts) {
 }
 
 /// The data of the charts.
-ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluation,
-                        const ShownPoses& shown, const std::optional<LearningCurve>& curve) {
+ordered_json chart_data(const Evaluation& evaluation, const ShownPoses& shown,
+                        const ordered_json& scene, const std::optional<LearningCurve>& curve) {
   ordered_json data;
   if (is_doubtful(evaluation)) data["doubtful"] = true;
   data["levels"] = ordered_json::object();
@@ -279,7 +287,7 @@ ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluat
   };
   put("histogram", histogram_json(shown));
   put("coverage", coverage_json(shown));
-  put("scene", scene_json(model, shown));
+  put("scene", scene);
   if (curve) {
     std::vector<double> error_mm;
     for (const double error : curve->error) error_mm.push_back(to_mm(error));
@@ -313,14 +321,16 @@ std::string learning_text(const std::optional<LearningCurve>& curve) {
 
 }  // namespace
 
-std::string model_page(const CompensatedModel& model,
-                       const std::optional<MeasurementBatch>& batch) {
+std::string model_page(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch,
+                       const std::string& last_check) {
+  const NextCheck next = next_check(model.provenance(), last_check, unix_now());
   const Compared compared = compared_with(model, batch);
   std::optional<PositionAccuracy> accuracy = PositionAccuracy::of(model, batch);
   const std::optional<std::string> no_promise = why_no_promise(model, accuracy, batch);
   if (no_promise) accuracy.reset();
   const ShownPoses shown = poses_to_show(model, batch);
   const std::optional<LearningCurve> curve = no_promise ? std::nullopt : learning_curve(model);
+  const ordered_json scene = scene_json(model, shown);
   const std::string title =
       html_text(fmt::format("Cell {}: model {}", model.cell().name, model.provenance().id));
   return fill_in(
@@ -329,15 +339,17 @@ std::string model_page(const CompensatedModel& model,
        {"mark", page_mark({"model", model.cell().name, model.provenance().id})},
        {"subtitle", html_text(fmt::format("{} · {}", model.cell().robot.name(),
                                           date_of(model.provenance().trained_at)))},
-       {"promise", html_text(no_promise ? *no_promise : promise_sentence(model, accuracy))},
-       {"certificate", certificate(model, accuracy, batch)},
+       {"promise", html_text(no_promise ? *no_promise : promise_sentence(model, accuracy, next))},
+       {"certificate", certificate(model, accuracy, batch, next)},
        {"tiles", tiles(compared.evaluation)},
        {"warnings", warnings(model, compared.evaluation)},
        {"compared", html_text(compared.text + bias_note(model.parts()) + reading_note(model))},
        {"figures", figures_table(compared.evaluation)},
+       {"axes", axes_table(compared.evaluation)},
        {"orientation", orientation_table(compared.evaluation)},
        {"budget", budget_section(model.parts().budget)},
-       {"worst", worst_poses(shown)},
+       {"poses", pose_table(shown)},
+       {"volumes", volume_table(model, scene)},
        {"learning", learning_text(curve)},
        {"provenance", provenance_rows(model, compared.evaluation)},
        {"sessions", session_changes_html(session_changes(model))},
@@ -345,8 +357,9 @@ std::string model_page(const CompensatedModel& model,
        {"parameters", parameter_table(model)},
        {"unidentifiable", unidentifiable_text(model.parts())},
        {"suspects", suspects_text(model.parts())},
-       {"data", script_json(chart_data(model, compared.evaluation, shown, curve))},
+       {"data", script_json(chart_data(compared.evaluation, shown, scene, curve))},
        {"page_css", std::string(page_style())},
+       {"sort_tables_js", std::string(sort_tables_script())},
        {"view3d_js", std::string(view3d_script())},
        {"chart_js", std::string(embedded::chart_js)}});
 }

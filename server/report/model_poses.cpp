@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kWorst = 10;
+constexpr std::size_t kMostListed = 1000;  // poses in the table
 constexpr int kBinsPerDecade = 3;
 constexpr double kLeastShown = 1e-3;         // mm: a smaller error stands in the first bin
 constexpr std::size_t kFewestToJudge = 8;    // poses
@@ -220,7 +220,7 @@ ordered_json coverage_json(const ShownPoses& shown) {
   return json;
 }
 
-std::string worst_poses(const ShownPoses& shown) {
+std::string pose_table(const ShownPoses& shown) {
   if (shown.poses.empty())
     return "<p>This file knows no pose by itself: give <code>trammel report --batch</code> one "
            "that was not trained on.</p>";
@@ -229,21 +229,33 @@ std::string worst_poses(const ShownPoses& shown) {
   std::stable_sort(order.begin(), order.end(), [](const ShownPose* a, const ShownPose* b) {
     return a->compensated.norm() > b->compensated.norm();
   });
-  order.resize(std::min(order.size(), kWorst));
+  const std::size_t left_out = order.size() - std::min(order.size(), kMostListed);
+  order.resize(order.size() - left_out);
+  const auto mm = [](double m) { return fmt::format("{:.4f}", to_mm(m)); };
   std::vector<HtmlRow> rows;
   for (const ShownPose* pose : order) {
-    const double size = pose->compensated.norm();
+    const Vector3& left = pose->compensated;
     rows.push_back(
-        {{html_text(pose->id),
-          pose->nominal ? fmt::format("{:.4f}", to_mm(pose->nominal->norm())) : "–",
-          fmt::format("{:.4f}", to_mm(pose->calibrated.norm())), fmt::format("{:.4f}", to_mm(size)),
-          fmt::format("{:.1f}", size / std::max(pose->stddev.norm(), 1e-12)),
+        {{html_text(pose->id), pose->nominal ? mm(pose->nominal->norm()) : "–",
+          mm(pose->calibrated.norm()), mm(left.norm()), mm(left.x()), mm(left.y()), mm(left.z()),
+          fmt::format("{:.1f}", left.norm() / std::max(pose->stddev.norm(), 1e-12)),
           pose->in_domain ? "" : "outside the domain"}});
   }
-  return html_table({"poses flows",
-                     {"pose", "nominal, mm", "calibrated, mm", "compensated, mm",
-                      "times its stated deviation", ""},
-                     rows});
+  const std::string more = left_out == 0
+                               ? ""
+                               : fmt::format(
+                                     "<p class=\"note\">{} poses with smaller errors are left out; "
+                                     "trammel evaluate --residuals lists all.</p>",
+                                     left_out);
+  return fmt::format(
+             "<p class=\"note\">{}: {}. The worst come first<span class=\"screen\">; click on "
+             "the name of a column to sort by it</span>.</p>\n",
+             shown.poses.size(), html_text(shown.title)) +
+         html_table({"poses flows sorts",
+                     {"pose", "nominal, mm", "calibrated, mm", "compensated, mm", "its dx, mm",
+                      "dy, mm", "dz, mm", "times its stated deviation", ""},
+                     rows}) +
+         more;
 }
 
 std::optional<LearningCurve> learning_curve(const CompensatedModel& model) {

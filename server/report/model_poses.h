@@ -39,7 +39,7 @@ struct ShownPoses {
 [[nodiscard]] nlohmann::ordered_json coverage_json(const ShownPoses& shown);
 
 /// The poses with the largest errors, as HTML.
-[[nodiscard]] std::string worst_poses(const ShownPoses& shown);
+[[nodiscard]] std::string pose_table(const ShownPoses& shown);
 
 /// The worth of fewer and of more poses.
 struct LearningCurve {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/file_doubts.h"
@@ -10,6 +11,7 @@
 #include "server/health/health_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/repeats.h"
+#include "server/report/cell_needs.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "server/robot/cell_papers.h"
@@ -25,34 +27,36 @@ constexpr int kFewestToPromise =
 /// Degrees of freedom of the residuals. With fewer, their rms may be wrong by half or more (1 /
 /// sqrt(2 k) is 22 % of it at 10), and nothing else shows the model's error.
 constexpr double kFewestFreedom = 10;
-constexpr std::int64_t kDay = 86400;
-/// The validity of a model in days if no check has measured its drift.
-constexpr std::int64_t kFirstCheck = 30;
 constexpr int kFewestRepeats = 6;  // degrees of freedom
 /// RP of ISO 9283 is the mean distance from the barycentre plus three of its standard deviations.
 /// That is 3.615 standard deviations of an axis if the three axes are equal and normal.
 constexpr double kRepeatability = 3.615;
 
-std::int64_t newest_measurement(const ModelProvenance& provenance) {
-  return provenance.measured_at.value_or(provenance.trained_at);
-}
-
-std::string check_by(const ModelProvenance& provenance) {
-  const std::int64_t from = newest_measurement(provenance);
-  if (from <= 0) return "when it was measured is not known, so check before use";
-  const std::int64_t due = from + kFirstCheck * kDay;
-  return fmt::format("check again by {}{}", shown_day(due),
-                     unix_now() > due ? ", a day that has passed" : "");
+std::string check_by(const NextCheck& next) {
+  if (next.verdict == "changed")
+    return "its last check says that the robot has changed since: measure it anew";
+  if (next.due.empty()) return "when it was measured is not known, so check before use";
+  return fmt::format("check again by {}{}", next.due, next.passed ? ", a day that has passed" : "");
 }
 
 /// The sentence for a check that is overdue; empty if it is not.
-std::string overdue(const ModelProvenance& provenance) {
-  const std::int64_t from = newest_measurement(provenance), now = unix_now();
-  if (from <= 0 || now <= from + kFirstCheck * kDay) return "";
+std::string overdue(const NextCheck& next) {
+  if (!next.passed) return "";
   return fmt::format(
       "<p class=\"warning\">That day had passed when this page was written, on {}: check the robot "
       "before you rely on it.</p>\n",
-      shown_day(now));
+      shown_day(unix_now()));
+}
+
+/// What the next check's date rests on.
+std::string basis_of(const NextCheck& next) {
+  return next.verdict.empty()
+             ? fmt::format(
+                   "That they hold for {} days is an assumption, until a check (<code>trammel "
+                   "check</code>) tells how fast this robot changes.",
+                   kUsualInterval / 86400)
+             : "The day of the next check is that of the last one (" +
+                   html_text(next.verdict == "cannot_tell" ? "cannot tell" : next.verdict) + ").";
 }
 
 std::string or_not_told(const std::string& text) {
@@ -89,8 +93,16 @@ std::string judged_by(const std::optional<PositionAccuracy>& accuracy) {
                "tested";
 }
 
+/// `1ee9e442-3fa1c07b`: of the model and of what is certified of it, so that two pages with one
+/// number say the same.
+std::string certificate_number(const CompensatedModel& model, const std::string& certified) {
+  return fmt::format("{:.8}-{:.8}", model.provenance().hash,
+                     sha256_hex(model.provenance().hash + "\n" + certified));
+}
+
 std::string papers_table(const CompensatedModel& model,
-                         const std::optional<PositionAccuracy>& accuracy) {
+                         const std::optional<PositionAccuracy>& accuracy,
+                         const std::string& number) {
   const CellPapers papers = papers_of(model.cell()).value_or(CellPapers{});
   const ModelProvenance& made = model.provenance();
   const MeasuredWords measured = words_of(model.parts().measured, model.cell());
@@ -98,6 +110,7 @@ std::string papers_table(const CompensatedModel& model,
   const auto add = [&](const char* name, const std::string& value) {
     rows.push_back({{name, html_text(value)}});
   };
+  add("certificate", number);
   add("robot", model.cell().robot.name());
   add("serial number", or_not_told(papers.serial_number));
   add("cell", model.cell().name);
@@ -110,6 +123,7 @@ std::string papers_table(const CompensatedModel& model,
                         : std::string("not compared with the controller (trammel confirm-robot)"));
   add("tool", tools(model.parts()));
   add("instrument", measured.instrument);
+  add("instrument's certificate", or_not_told(papers.instrument_certificate));
   add("operator", or_not_told(papers.operator_name));
   // A batch without times has the date of its file, and the model does not distinguish the two.
   add("measured", made.measured_at
@@ -269,23 +283,61 @@ std::string rounded_up_mm(double length) {
 }
 
 std::string promise_sentence(const CompensatedModel& model,
-                             const std::optional<PositionAccuracy>& accuracy) {
+                             const std::optional<PositionAccuracy>& accuracy,
+                             const NextCheck& next) {
   if (!accuracy)
     return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
   return fmt::format("Good to {} mm at 95 % in this volume{}{}; not known beyond; {}.",
                      rounded_up_mm(accuracy->at(PositionAccuracy::kShare)),
-                     from_that_side(model.parts()), hardly_judged(*accuracy),
-                     check_by(model.provenance()));
+                     from_that_side(model.parts()), hardly_judged(*accuracy), check_by(next));
+}
+
+std::string volume_table(const CompensatedModel& model, const nlohmann::ordered_json& scene) {
+  const auto span = [](const Vector3& lower, const Vector3& upper) {
+    std::string text;
+    for (int k = 0; k < 3; ++k)
+      text += fmt::format("{}{}\u00a0{:.0f}\u00a0to\u00a0{:.0f}", k == 0 ? "" : ", ", "xyz"[k],
+                          lower(k), upper(k));
+    return text + " mm";
+  };
+  const auto corner = [](const nlohmann::ordered_json& p) {
+    return Vector3(p.at(0).get<double>(), p.at(1).get<double>(), p.at(2).get<double>());
+  };
+  std::vector<HtmlRow> rows;
+  if (const auto& measured = model.parts().measured) {
+    const Vector3 sides = measured->upper - measured->lower;
+    rows.push_back(
+        {{"measured (green)", span(to_mm(1) * measured->lower, to_mm(1) * measured->upper),
+          fmt::format("{:.3g} m³", sides.prod()),
+          fmt::format("the box that the tool was in at {} poses", measured->poses)}});
+  }
+  if (scene.is_object() && scene.contains("promised")) {
+    const auto& promised = scene["promised"];
+    rows.push_back(
+        {{"promised (blue)", span(corner(promised.at("lower")), corner(promised.at("upper"))),
+          fmt::format("{:.3g} m³", promised.at("volume_m3").get<double>()),
+          fmt::format("inside the rings, up to {:.0f} mm from the first axis; trammel "
+                      "correct says of each target whether it is",
+                      promised.at("radius_mm").get<double>())}});
+  }
+  if (rows.empty()) return "<p>Not on record.</p>\n";
+  return html_table(
+             {"volumes flows", {"volume", "of the tool, in the robot's base", "size", ""}, rows}) +
+         "\n";
 }
 
 std::string certificate(const CompensatedModel& model,
                         const std::optional<PositionAccuracy>& accuracy,
-                        const std::optional<MeasurementBatch>& batch) {
-  const std::string papers = papers_table(model, accuracy);
+                        const std::optional<MeasurementBatch>& batch, const NextCheck& next) {
+  // A day that passes changes nothing of what is certified.
+  const std::string number = certificate_number(
+      model, promise_sentence(model, accuracy, {next.due, false, next.verdict, next.why}) +
+                 (batch ? batch->id : ""));
+  const std::string papers = papers_table(model, accuracy, number);
   const std::string about = "<p class=\"about\">It rests on " +
                             html_text(in_words(model.parts().measured, model.cell())) + ".</p>\n";
   if (!accuracy) return about + papers;
-  const std::string late = overdue(model.provenance());
+  const std::string late = overdue(next);
   const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
   return about + late + tolerance_sentence(*accuracy, tolerance) +
          tolerance_table(*accuracy, tolerance) +
@@ -299,11 +351,10 @@ std::string certificate(const CompensatedModel& model,
          fmt::format(
              "\n<p class=\"note\">The figures are of the tool's true position after correction by "
              "this model, at any fresh pose of the volume, not at ISO's five poses; the "
-             "instrument's noise is taken out. That they hold for {} days is an assumption, until "
-             "a check (<code>trammel check</code>) tells how fast this robot changes. A lasting "
-             "error of up to {} mm an axis would not show, as nobody knows the instrument's sigma "
+             "instrument's noise is taken out. {} A lasting error of up to {} mm an axis would not "
+             "show, as nobody knows the instrument's sigma "
              "better than to 10 %.</p>\n",
-             kFirstCheck, rounded_up_mm(accuracy->hidden()));
+             basis_of(next), rounded_up_mm(accuracy->hidden()));
 }
 
 }  // namespace trammel

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "server/compensate/accuracy.h"
+#include "server/report/cell_needs.h"
 
 namespace trammel {
 
@@ -11,7 +13,8 @@ namespace trammel {
 /// up. The sentence also states if joints came from one side, if no pose was held out, and if
 /// nothing is known.
 [[nodiscard]] std::string promise_sentence(const CompensatedModel& model,
-                                           const std::optional<PositionAccuracy>& accuracy);
+                                           const std::optional<PositionAccuracy>& accuracy,
+                                           const NextCheck& next);
 
 /// The reason why no accuracy can be stated, and the remedy. Either the poses of `batch` are
 /// foreign_poses(), or the measured coordinates have too few degrees of freedom left to show the
@@ -26,7 +29,13 @@ namespace trammel {
 /// repeatability.
 [[nodiscard]] std::string certificate(const CompensatedModel& model,
                                       const std::optional<PositionAccuracy>& accuracy,
-                                      const std::optional<MeasurementBatch>& batch);
+                                      const std::optional<MeasurementBatch>& batch,
+                                      const NextCheck& next);
+
+/// The box that was measured and the region that is promised, in numbers, as a table. `scene`:
+/// scene_json(), which draws them.
+[[nodiscard]] std::string volume_table(const CompensatedModel& model,
+                                       const nlohmann::ordered_json& scene);
 
 /// `0.082`, mm of a length in m: two digits, never smaller than it is.
 [[nodiscard]] std::string rounded_up_mm(double length);

@@ -10,6 +10,8 @@ namespace trammel {
 std::string_view page_style() { return embedded::page_css; }
 std::string_view view3d_script() { return embedded::view3d_js; }
 
+std::string_view sort_tables_script() { return embedded::sort_tables_js; }
+
 std::string shown_day(std::int64_t unix_s) {
   if (unix_s <= 0) return "–";
   const std::time_t time = unix_s;

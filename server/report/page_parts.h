@@ -12,6 +12,9 @@ namespace trammel {
 /// pointer.
 [[nodiscard]] std::string_view view3d_script();
 
+/// JavaScript: tables of kind `sorts` sort by a click on the name of a column.
+[[nodiscard]] std::string_view sort_tables_script();
+
 /// `2026-11-22`, UTC; a dash where no time is known (0 or less).
 [[nodiscard]] std::string shown_day(std::int64_t unix_s);
 

@@ -30,6 +30,7 @@ std::vector<std::string> texts_of(std::string_view page, std::string_view name) 
 std::string shared_text(std::string_view text) {
   if (text == "{{chart_js}}") return std::string(embedded::chart_js);
   if (text == "{{view3d_js}}") return std::string(embedded::view3d_js);
+  if (text == "{{sort_tables_js}}") return std::string(embedded::sort_tables_js);
   if (text == "{{page_css}}") return std::string(embedded::page_css);
   return std::string(text);
 }

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <vector>
 
+#include "server/base/text_file.h"
 #include "server/report/html.h"
 
 namespace trammel {
@@ -20,12 +22,14 @@ namespace fs = std::filesystem;
 constexpr std::size_t kHead = 4096;     // bytes of a page that are read
 constexpr int kMostEntries = 2000;      // of a folder
 constexpr std::size_t kMostLinks = 40;  // of a page
-constexpr std::string_view kPlace = "<nav class=\"beside\"></nav>";
+constexpr std::string_view kPlace = "<nav class=\"beside\">", kPlaceEnd = "</nav>";
+constexpr std::uintmax_t kLargest = 16'000'000;  // bytes of a page that is given links
 constexpr std::string_view kMark = "<meta name=\"trammel-page\"";
 
 /// The names of pages of each kind in links, in their order.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kKinds = {
+constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kKinds = {
     {{"fleet", "fleet"},
+     {"view", "cell in space"},
      {"history", "history"},
      {"model", "model"},
      {"diagnosis", "diagnosis"},
@@ -109,6 +113,11 @@ std::string link_to(const FoundMark& mark, bool names_cell) {
                      html_text(mark.file));
 }
 
+/// Of one cell, or one of them of several.
+bool are_related(const FoundMark& one, const FoundMark& other) {
+  return one.cell.empty() || other.cell.empty() || one.cell == other.cell;
+}
+
 }  // namespace
 
 std::string page_mark(const PageMark& mark) {
@@ -118,23 +127,38 @@ std::string page_mark(const PageMark& mark) {
 
 std::string with_pages_beside(std::string page, const std::string& path) {
   const std::size_t place = page.find(kPlace);
+  const std::size_t end = place == std::string::npos ? place : page.find(kPlaceEnd, place);
   const auto own = mark_in(std::string_view(page).substr(0, kHead));
-  if (path == "-" || place == std::string::npos || !own) return page;
+  if (path == "-" || end == std::string::npos || !own) return page;
   const fs::path folder = fs::path(path).parent_path();
   auto marks = marks_in(folder.empty() ? "." : folder, fs::path(path).filename().string());
-  std::erase_if(marks, [&](const FoundMark& one) {
-    return !own->cell.empty() && !one.cell.empty() && one.cell != own->cell;
-  });
+  std::erase_if(marks, [&](const FoundMark& one) { return !are_related(one, *own); });
   std::sort(marks.begin(), marks.end(), [](const FoundMark& a, const FoundMark& b) {
     return std::tie(a.kind, a.cell, a.file) < std::tie(b.kind, b.cell, b.file);
   });
   if (marks.size() > kMostLinks) marks.resize(kMostLinks);
   std::string links;
   for (const FoundMark& one : marks) links += link_to(one, own->cell.empty()) + "\n";
-  if (!links.empty())
-    page.replace(place, kPlace.size(),
-                 "<nav class=\"beside\">Beside this page: " + links + "</nav>");
-  return page;
+  if (!links.empty()) links = "Beside this page: " + links;
+  return page.replace(place + kPlace.size(), end - place - kPlace.size(), links);
+}
+
+void link_pages_beside(const std::string& page, const std::string& path) {
+  const auto own = mark_in(std::string_view(page).substr(0, kHead));
+  if (path == "-" || !own) return;
+  const fs::path parent = fs::path(path).parent_path();
+  const fs::path folder = parent.empty() ? "." : parent;
+  for (const FoundMark& one : marks_in(folder, fs::path(path).filename().string())) {
+    const std::string file = (folder / one.file).string();
+    std::error_code error;
+    const bool plain = !fs::is_symlink(file, error) && fs::file_size(file, error) <= kLargest;
+    if (!are_related(one, *own) || error || !plain) continue;
+    const auto text = read_text_file(file);
+    if (!text) continue;
+    const std::string linked = with_pages_beside(*text, file);
+    // A page that must not be changed stays as it was: it lacks a link, and nothing else.
+    if (linked != *text) static_cast<void>(write_text_file(file, linked));
+  }
 }
 
 }  // namespace trammel

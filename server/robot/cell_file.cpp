@@ -307,7 +307,6 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] { read_model(map, cell); });
   static_cast<void>(read_rules(map));
   static_cast<void>(read_papers(map));
-  static_cast<void>(read_obstacles(map, cell.robot.size()));
   map.attempt([&] { static_cast<void>(read_confirmation(map)); });
   return cell;
 }
@@ -340,6 +339,7 @@ Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
     if (!robot) throw YamlRefusal{robot.error()};
     cell.robot = *robot;
     map.attempt([&] { read_joint_ranges(map, cell); });
+    static_cast<void>(read_obstacles(map, cell.robot.size()));
     cell.cell_yaml = cell_yaml;
     return cell;
   });

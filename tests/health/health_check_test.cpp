@@ -9,6 +9,7 @@
 #include "server/base/units.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/health_json.h"
+#include "server/report/page_parts.h"
 #include "server/tasks/train/train.h"
 #include "tests/support/checked_robot.h"
 #include "tests/support/demand.h"
@@ -101,7 +102,13 @@ TEST_F(HealthTest, WhenTheNextCheckIsDueFollowsFromAllChecksThatWereMade) {
         options));
     ASSERT_TRUE(check.drift && check.drift_rate) << check.due_because;
     EXPECT_EQ(check.drift_rate->checks, month);
-    EXPECT_EQ(check.due.empty(), month < 3) << "two checks are no rate";
+    double squares = 0;
+    for (const PoseAtCheck& pose : check.at_poses) squares += pose.off_B.squaredNorm();
+    ASSERT_EQ(check.at_poses.size(), static_cast<std::size_t>(check.poses));
+    EXPECT_NEAR(std::sqrt(squares / check.poses), check.rms, 1e-12) << "poses add up to the rms";
+    EXPECT_EQ(check.due_because.find("until then every 30 days") != std::string::npos, month < 3)
+        << "two checks are no rate: " << check.due_because;
+    if (month < 3) EXPECT_EQ(check.due, shown_day(*batch.measured_at + kUsualInterval));
     const std::string text = health_json(check, {}).dump();
     const auto read = drift_of(text);
     ASSERT_TRUE(read) << text;
@@ -166,6 +173,15 @@ TEST_F(HealthTest, ASingleBadPoseIsNamedAndIsNoChangeNorHealth) {
     EXPECT_EQ(check.verdict, HealthVerdict::kCannotTell) << seed << ": " << check.sentence;
     ASSERT_EQ(check.suspects.size(), 1u) << check.sentence;
     EXPECT_EQ(check.suspects.front(), fmt::format("p{}", bad + 1));
+    const auto& here = check.at_poses;
+    const auto worst = std::max_element(
+        here.begin(), here.end(),
+        [](const auto& one, const auto& other) { return one.off_B.norm() < other.off_B.norm(); });
+    ASSERT_NE(worst, here.end());
+    EXPECT_EQ(worst->pose_id, check.suspects.front());
+    EXPECT_TRUE(worst->suspect);
+    EXPECT_EQ(std::count_if(here.begin(), here.end(), [](const auto& one) { return one.suspect; }),
+              1);
   }
 }
 

@@ -66,11 +66,11 @@ class PagesTest : public testing::Test {
 };
 
 TEST_F(PagesTest, TheFleetSaysWhichCellsAreDarkAndWhy) {
-  EXPECT_NE(page("/").body.find("1 of 1 cells is dark"), std::string::npos);
+  EXPECT_NE(page("/").body.find("0 of 1 cell are fine; act now: cell-7."), std::string::npos);
   EXPECT_NE(page("/").body.find("submit a batch"), std::string::npos);
   server_.submit("cell-7", "b1", 1);
   server_.work();
-  EXPECT_NE(page("/").body.find("Its cell is answered for"), std::string::npos);
+  EXPECT_NE(page("/").body.find("Its cell is fine."), std::string::npos);
 }
 
 TEST_F(PagesTest, EveryLinkLeadsToAPageAndEveryPageIsReached) {

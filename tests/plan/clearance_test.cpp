@@ -99,6 +99,17 @@ TEST(Clearance, AGivenPoseThatTouchesIsRefusedByItsName) {
   EXPECT_NE(plan.error().message.find("pose low: "), std::string::npos) << plan.error().message;
 }
 
+TEST(Clearance, EachLinkAndTheToolHasItsOwnRadius) {
+  const auto cell = cell_among(
+      "obstacles:\n  boxes: {post: {lower: [5000, 0, 0], upper: [5100, 100, 100]}}\n"
+      "  link_radii_mm: [250, 200, 150, 130, 100, 80, 40]\n");
+  const Clearance clearance(*cell, cell->tools.begin()->first);
+  EXPECT_NEAR(clearance.radius_of({{}, {}, 0}), 0.25, 1e-12);
+  EXPECT_NEAR(clearance.radius_of({{}, {}, 6}), 0.04, 1e-12) << "the tool";
+  EXPECT_NE(obstacles_in_words(*cell).find("40 to 250 mm in radius"), std::string::npos)
+      << obstacles_in_words(*cell);
+}
+
 TEST(Clearance, WhatIsMisstatedIsRefused) {
   for (const char* wrong : {"obstacles: {floor: 3}\n", "obstacles: {link_radii_mm: [1, 2]}\n",
                             "obstacles: {boxes: {a: {lower: [1, 0, 0], upper: [0, 1, 1]}}}\n",

@@ -17,10 +17,25 @@ constexpr const char* kFindings =
 
 TEST(HealthPage, SaysVerdictChangesAndWhenToCheckAgain) {
   const std::string page = health_sections(kFindings, "<p>links</p>");
-  for (const char* part :
-       {"cannot tell: too &lt;few&gt;", "2026-12-01: it drifts", "gear ripple in joint 3",
-        "0.0500 mm", "tool position", "link geometry, d4</td><td>never", "<p>links</p>"})
+  for (const char* part : {"<span class=\"badge soon\">cannot tell</span>too &lt;few&gt;",
+                           "2026-12-01: it drifts", "gear ripple in joint 3", "0.0500 mm",
+                           "tool position", "link geometry, d4</td><td>never", "<p>links</p>"})
     EXPECT_TRUE(test::has(page, part)) << part << "\n" << page;
+}
+
+TEST(HealthPage, DrawsThePosesAndListsWhatEachIsOffByTheWorstFirst) {
+  const std::string page = health_sections(
+      R"({"verdict": "healthy", "why": "as its model has it", "at_poses": [
+        {"pose_id": "p<1>", "xyz_mm": [1000, 0, 500], "off_mm": [0.01, -0.02, 0.005], "expected_mm": 0.03, "suspect": false},
+        {"pose_id": "p2", "xyz_mm": [500, 800, 900], "off_mm": [1.5, 0, 0], "expected_mm": 0.03, "suspect": true},
+        {"pose_id": "p3", "xyz_mm": [1], "off_mm": null}]})",
+      "");
+  for (const char* part : {"<span class=\"badge good\">healthy</span>", "from above",
+                           "from the side", "<title>p&lt;1&gt;: 0.0229 mm</title>",
+                           "drawn 100 times as long", "fits nothing, left out", "-0.0200"})
+    EXPECT_TRUE(test::has(page, part)) << part << "\n" << page;
+  EXPECT_LT(page.find(">p2</td>"), page.find(">p&lt;1&gt;</td>")) << "the worst first";
+  EXPECT_FALSE(test::has(page, ">p3</td>"));
 }
 
 TEST(HealthPage, OfWhatItCannotReadLeavesOut) {

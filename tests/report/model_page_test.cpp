@@ -185,6 +185,10 @@ std::shared_ptr<const Cell> cell_with(const std::string& keys) {
                                           .value());
 }
 
+NextCheck next_of(const CompensatedModel& model) {
+  return next_check(model.provenance(), "", unix_now());
+}
+
 CompensatedModel trained_on(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                             const std::string& level = "M1") {
   TrainOptions options;
@@ -197,7 +201,7 @@ CompensatedModel trained_on(const std::shared_ptr<const Cell>& cell, const Measu
 TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const CompensatedModel model = trained_on(cell_with(""), batch_);
   const auto accuracy = PositionAccuracy::of(model);
-  const std::string promise = promise_sentence(model, accuracy);
+  const std::string promise = promise_sentence(model, accuracy, next_of(model));
   EXPECT_EQ(promise,
             fmt::format("Good to {} mm at 95 % in this volume, by its training poses alone; not "
                         "known beyond; check again by 2025-12-24, a day that has passed.",
@@ -205,6 +209,36 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const std::string page = model_page(model, std::nullopt);
   EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));
   EXPECT_LT(page.find(promise), page.find("<table"));
+}
+
+TEST_F(ModelPage, IsToBeCheckedAgainAsItsLastCheckSays) {
+  const CompensatedModel model = trained_on(cell_with(""), batch_);
+  const auto check = [&](const std::string& id, const std::string& verdict) {
+    return fmt::format(R"({{"model": "{}", "verdict": "{}", "why": "so", "due": "2199-02-03"}})",
+                       id, verdict);
+  };
+  const std::string id = model.provenance().id;
+  EXPECT_TRUE(has(model_page(model, std::nullopt, check(id, "healthy")),
+                  "; check again by 2199-02-03.</p>"));
+  EXPECT_TRUE(has(model_page(model, std::nullopt, check(id, "changed")),
+                  "its last check says that the robot has changed since"));
+  EXPECT_TRUE(has(model_page(model, std::nullopt, check("another", "healthy")),
+                  "check again by 2025-12-24"));
+}
+
+TEST_F(ModelPage, HasANumberThatIsOfWhatItCertifies) {
+  const auto number_of = [](const std::string& page) {
+    static const std::string kRow = "<td>certificate</td><td>";
+    const std::size_t at = page.find(kRow);
+    return at == std::string::npos ? "" : page.substr(at + kRow.size(), 17);
+  };
+  const CompensatedModel model = trained_on(cell_with("instrument_certificate: DE-17\n"), batch_);
+  const std::string page = model_page(model, std::nullopt);
+  EXPECT_TRUE(has(page, "<td>instrument's certificate</td><td>DE-17</td>"));
+  EXPECT_EQ(number_of(page), number_of(model_page(model, std::nullopt)));
+  EXPECT_EQ(number_of(page).substr(0, 9), model.provenance().hash.substr(0, 8) + "-");
+  EXPECT_NE(number_of(page),
+            number_of(model_page(model, check_against_cell(batch_, *cell_)->rows())));
 }
 
 TEST_F(ModelPage, SaysWhatWasMeasuredAndDrawsIt) {
@@ -221,7 +255,17 @@ TEST_F(ModelPage, SaysWhatWasMeasuredAndDrawsIt) {
         "mm of the tool from the robot's base",
         "<p class=\"about\">It rests on 21 training poses; sides of approach: every joint"})
     EXPECT_TRUE(has(page, part)) << part;
-  EXPECT_FALSE(has(promise_sentence(model, PositionAccuracy::of(model)), "comes to"));
+  EXPECT_FALSE(
+      has(promise_sentence(model, PositionAccuracy::of(model), next_of(model)), "comes to"));
+  const auto promised = chart_data(page).at("scene").at("promised");
+  EXPECT_TRUE(has(page, fmt::format("up to {:.0f} mm from the first axis",
+                                    promised.at("radius_mm").get<double>())));
+  EXPECT_TRUE(has(page, "<td>measured (green)</td>"));
+  EXPECT_GT(promised.at("volume_m3").get<double>(), 0);
+  const double radius = promised.at("radius_mm").get<double>() / 1000;
+  const double height =
+      (promised.at("upper").at(2).get<double>() - promised.at("lower").at(2).get<double>()) / 1000;
+  EXPECT_LE(promised.at("volume_m3").get<double>(), kPi * radius * radius * height * 1.001);
   const auto box = chart_data(page).at("scene").at("box");
   EXPECT_NEAR(box.at(0).at(0), to_mm(model.parts().measured->lower.x()), 0.06);
   EXPECT_NEAR(box.at(1).at(2), to_mm(model.parts().measured->upper.z()), 0.06);
@@ -231,7 +275,7 @@ TEST_F(ModelPage, APromiseOfPosesFromOneSideIsOfThatSide) {
   MeasurementBatch above = batch_;
   for (Measurement& m : above.measurements) m.context.direction.assign(6, -1);
   const CompensatedModel model = trained_on(cell_with(""), above);
-  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)),
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model), next_of(model)),
                   " in this volume, for poses that the arm comes to from above, by its training "
                   "poses alone; not"));
   EXPECT_TRUE(has(model_page(model, std::nullopt),
@@ -249,13 +293,13 @@ TEST_F(ModelPage, OfAModelThatDoesNotTellWhatWasMeasuredItSaysSo) {
 
 TEST_F(ModelPage, SaysFirstWhereNoPoseHasTestedIt) {
   const CompensatedModel model = trained("none");
-  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)),
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model), next_of(model)),
                   " volume, by its training poses alone; not"));
   const auto tested = PositionAccuracy::of(model, check_against_cell(batch_, *cell_)->rows());
-  EXPECT_TRUE(has(promise_sentence(model, tested), " volume; not known beyond"));
+  EXPECT_TRUE(has(promise_sentence(model, tested, next_of(model)), " volume; not known beyond"));
   MeasurementBatch single = check_against_cell(batch_, *cell_)->rows();
   single.measurements.resize(1);
-  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model, single)),
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model, single), next_of(model)),
                   ", tested by 1 fresh pose only; not"));
 }
 
@@ -403,7 +447,7 @@ TEST_F(ModelPage, TheCurveOfABiasEndsAtAllPosesAndThatOfParametersFallsWithThem)
   EXPECT_TRUE(has(model_page(learned, std::nullopt), curve->sentence));
 }
 
-TEST_F(ModelPage, ListsTheWorstPosesFirst) {
+TEST_F(ModelPage, ListsAllPosesTheWorstFirst) {
   const auto checked = check_against_cell(batch_, *cell_);
   MeasurementBatch rows = checked->rows();
   rows.measurements[7].p_W.z() += 1e-3;
@@ -413,6 +457,39 @@ TEST_F(ModelPage, ListsTheWorstPosesFirst) {
   const std::size_t first = page.find("<tr><td>", table);
   EXPECT_EQ(page.substr(first + 8, rows.measurements[7].pose_id.size() + 1),
             rows.measurements[7].pose_id + "<");
+  const std::string listed = page.substr(table, page.find("</table>", table) - table);
+  std::size_t count = 0;
+  for (std::size_t at = listed.find("<tr><td>"); at != std::string::npos;
+       at = listed.find("<tr><td>", at + 1))
+    ++count;
+  EXPECT_EQ(count, rows.measurements.size());
+}
+
+TEST_F(ModelPage, ItsTableOfPosesSortsByAColumnThatIsClickedOn) {
+  if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
+  std::string page = model_page(trained("none"), check_against_cell(batch_, *cell_)->rows());
+  page.replace(page.rfind("</body>"), 7, R"(<script>window.addEventListener("load", () => {
+    const table = document.querySelector("table.sorts"), head = table.querySelectorAll("th")[4];
+    const seen = () => [...table.tBodies[0].rows].map(row => Number(row.cells[4].textContent));
+    const falls = list => list.every((v, i) => i === 0 || v <= list[i - 1]) ? 1 : 0;
+    window.clicks = [falls(seen())];
+    head.click(); window.clicks.push(falls(seen()));
+    head.click(); window.clicks.push(falls(seen().reverse()));
+    const told = document.createElement("p"); told.id = "told";
+    told.textContent = "clicks " + window.clicks.join("");
+    document.body.append(told);
+  });</script></body>)");
+  EXPECT_TRUE(has(test::dom_in_browser(page), "clicks 011"));
+}
+
+TEST_F(ModelPage, IsTwoSheetsOfPaperBeforeItsAppendix) {
+  if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
+  const CompensatedModel model = trained("se", 0.3);
+  std::string page = model_page(model, check_against_cell(batch_, *cell_)->rows());
+  EXPECT_GT(test::pages_on_paper(page), 2);
+  page.replace(page.rfind("</body>"), 7,
+               "<script>document.getElementById('appendix').remove();</script></body>");
+  EXPECT_LE(test::pages_on_paper(page), 2);
 }
 
 TEST_F(ModelPage, HasNoEmptyPlotInARealBrowserHoweverNarrowAndIsLight) {

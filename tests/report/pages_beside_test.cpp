@@ -39,6 +39,25 @@ TEST_F(PagesBeside, APageLinksToThoseOfItsCellThatAreThereAndToNothingElse) {
     EXPECT_FALSE(has(page, absent)) << absent;
 }
 
+TEST_F(PagesBeside, PagesThatWereThereLeadToANewOneAndNothingElseOfThemChanges) {
+  const std::string before = with_pages_beside(page_of("model", "cell-7"), folder_.file("m.html"));
+  const std::string model = folder_.write("m.html", before);
+  const std::string other = folder_.write("other.html", page_of("model", "cell-8"));
+  const std::string foreign = folder_.write("foreign.html", "<nav class=\"beside\"></nav>");
+  const std::string page = linked("health", "cell-7");
+  folder_.write("new.html", page);
+  link_pages_beside(page, folder_.file("new.html"));
+  const std::string link = "<a href=\"./new.html\">health (new.html)</a>\n";
+  std::string after = test::read_file(model);
+  EXPECT_TRUE(has(after, link)) << after;
+  after.erase(after.find("Beside this page: " + link), 18 + link.size());
+  EXPECT_EQ(after, before);
+  EXPECT_EQ(test::read_file(other), page_of("model", "cell-8"));
+  EXPECT_EQ(test::read_file(foreign), "<nav class=\"beside\"></nav>");
+  link_pages_beside(page, folder_.file("new.html"));
+  EXPECT_EQ(test::read_file(model).find(link), test::read_file(model).rfind(link)) << "once";
+}
+
 TEST_F(PagesBeside, AFleetLinksToThePagesOfAllItsCellsAndTheyToIt) {
   folder_.write("m.html", page_of("model", "cell-7"));
   folder_.write("n.html", page_of("model", "cell-8"));

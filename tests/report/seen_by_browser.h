@@ -64,6 +64,16 @@ inline std::map<std::string, int> seen_by_browser(std::string page, int width) {
   return seen;
 }
 
+/// The page as its scripts leave it.
+inline std::string dom_in_browser(const std::string& page) {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("page.html", page);
+  return run({kBrowser, "--headless=new", "--no-sandbox", "--disable-gpu",
+              "--virtual-time-budget=5000", "--user-data-dir=" + folder.file("profile"),
+              "--dump-dom", "file://" + file})
+      .out;
+}
+
 /// Sheets of paper that the page takes.
 inline int pages_on_paper(const std::string& page) {
   const TemporaryFolder folder;

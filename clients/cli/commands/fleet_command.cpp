@@ -28,7 +28,7 @@ Result<ordered_json> fleet_of_files(const std::vector<std::string>& paths) {
     CompensatedModel model = TRY(load_model(path));
     cells.push_back({path, 0, std::move(model), ""});
   }
-  return fleet_json(cells);
+  return fleet_json(cells, unix_now());
 }
 
 /// The answers of every server; their bytes come from outside.

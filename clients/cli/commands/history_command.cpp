@@ -26,19 +26,6 @@ std::optional<double> metres(const std::optional<double>& mm) {
   return mm ? std::optional(*mm * from_mm(1)) : std::nullopt;
 }
 
-VersionOnRecord on_record(const CompensatedModel& model, int version) {
-  const ModelProvenance& made = model.provenance();
-  const auto& judged = model.parts().validation;
-  VersionOnRecord one{version,
-                      made.id,
-                      made.batch_id,
-                      made.trained_at,
-                      made.training_poses,
-                      judged ? std::optional(judged->compensated.rms) : std::nullopt};
-  put_on_record(model, one);
-  return one;
-}
-
 Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
   CellHistory history;
   for (const std::string& path : arguments.models) {
@@ -85,7 +72,8 @@ Status add_events(client::Session& session, std::size_t last, CellHistory& histo
   for (const client::AuditText& text : texts) {
     const auto trail = TRY(audit_of_json(text.json));
     for (const AuditRow& row : trail.rows)
-      history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+      history.events.push_back(
+          {row.at, row.what, row.subject, row.why, row.who, row.before, row.after});
   }
   return {};
 }

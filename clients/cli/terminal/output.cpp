@@ -13,6 +13,7 @@
 
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
+#include "server/report/pages_beside.h"
 
 namespace trammel::cli {
 
@@ -54,7 +55,11 @@ bool& standard_output_is_taken() {
 }  // namespace
 
 Status write_output(const std::string& path, const std::string& text) {
-  if (path != "-") return write_text_file(path, text);
+  if (path != "-") {
+    TRY(write_text_file(path, text));
+    link_pages_beside(text, path);
+    return {};
+  }
   standard_output_is_taken() = true;
   const bool written =
       std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
@@ -130,6 +135,7 @@ Status Outputs::write() const {
     if (output.text && output.file.path != "-") files.push_back({output.file.path, *output.text});
   }
   TRY(write_text_files(files));
+  for (const TextFile& file : files) link_pages_beside(file.text, file.path);
   for (const Output& output : outputs_) {
     if (output.text && output.file.path == "-") return write_output("-", *output.text);
   }

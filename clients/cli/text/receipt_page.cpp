@@ -102,6 +102,11 @@ std::string facts(const CorrectedProgram& program) {
   return html_table({"facts", {}, rows});
 }
 
+/// How far the corrected target is from the wanted one along an axis of the base, mm.
+std::string moved(const ReceiptRow& row, int axis) {
+  return row.corrected() ? mm(to_mm(row.correction_B(axis))) : "";
+}
+
 std::string targets(const CorrectedProgram& program) {
   std::vector<HtmlRow> rows;
   for (const ReceiptRow& row : program.rows) {
@@ -112,13 +117,15 @@ std::string targets(const CorrectedProgram& program) {
     rows.push_back(
         {{html_text(fmt::format("{}:{}", row.file, row.line)), html_text(shown_name(row)),
           html_text(row.motion), html_text(row.tool), html_text(row.frame), html_text(row.status),
-          mm(row.error_before_mm), mm(row.error_after_mm), mm(row.sigma_mm), mm(row.rounding_mm),
-          html_text(said)},
+          moved(row, 0), moved(row, 1), moved(row, 2), mm(row.error_before_mm),
+          mm(row.error_after_mm), mm(row.sigma_mm), mm(row.rounding_mm), html_text(said)},
          row.corrected() ? row.status : "left"});
   }
-  return html_table({"targets",
-                     {"place", "name", "motion", "tool", "frame", "status", "before, mm",
-                      "after, mm", "sigma, mm", "rounding, mm", ""},
+  return "<p class=\"note\">dx, dy, dz: how far the commanded target is from the wanted one, along "
+         "the axes of the robot's base.</p>\n" +
+         html_table({"targets",
+                     {"place", "name", "motion", "tool", "frame", "status", "dx, mm", "dy, mm",
+                      "dz, mm", "before, mm", "after, mm", "sigma, mm", "rounding, mm", ""},
                      rows});
 }
 

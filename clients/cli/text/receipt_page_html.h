@@ -15,7 +15,7 @@ constexpr std::string_view kReceiptPage = R"page(<!DOCTYPE html>
 <title>Trammel: corrected program</title>
 <style>{{page_css}}</style>
 <style>
-.targets { font-size: 13px; } .targets td:nth-child(n+3):nth-child(-n+10) { white-space: nowrap; } .targets td:nth-child(-n+2) { overflow-wrap: anywhere; } .targets td:nth-child(7), .targets td:nth-child(8), .targets td:nth-child(9), .targets td:nth-child(10) { text-align: right; }
+.targets { font-size: 13px; } .targets td:nth-child(n+3):nth-child(-n+13) { white-space: nowrap; } .targets td:nth-child(-n+2) { overflow-wrap: anywhere; } .targets td:nth-child(n+7):nth-child(-n+13) { text-align: right; }
 table.facts { width: auto; } table.facts td:first-child { color: var(--soft); }
 tr.left td { background: #fbe6da; } tr.out_of_domain td { background: #fff6e0; }
 #path { display: block; width: 100%; height: 28rem; border: 1px solid var(--line); border-radius: 6px; touch-action: none; cursor: grab; }
@@ -30,8 +30,9 @@ tr.left td { background: #fbe6da; } tr.out_of_domain td { background: #fff6e0; }
   .targets td, .targets td:nth-child(n) { display: inline-block; border: 0; padding: 0 14px 0 0; text-align: left; white-space: normal; background: none; }
   .targets td:nth-child(-n+2) { font-weight: 600; } tr.left { background: #fbe6da; } tr.out_of_domain { background: #fff6e0; }
   .targets td:nth-child(n+4)::before { color: var(--soft); } .targets td:nth-child(4)::before { content: "tool "; } .targets td:nth-child(5)::before { content: "frame "; }
-  .targets td:nth-child(7)::before { content: "before, mm "; } .targets td:nth-child(8)::before { content: "after, mm "; }
-  .targets td:nth-child(9)::before { content: "sigma, mm "; } .targets td:nth-child(10)::before { content: "rounding, mm "; }
+  .targets td:nth-child(7)::before { content: "dx, mm "; } .targets td:nth-child(8)::before { content: "dy, mm "; } .targets td:nth-child(9)::before { content: "dz, mm "; }
+  .targets td:nth-child(10)::before { content: "before, mm "; } .targets td:nth-child(11)::before { content: "after, mm "; }
+  .targets td:nth-child(12)::before { content: "sigma, mm "; } .targets td:nth-child(13)::before { content: "rounding, mm "; }
 }
 @media print { tr { break-inside: avoid; } #path { height: 16rem; break-inside: avoid; } .targets { font-size: 8px; } .targets td:nth-child(n) { white-space: normal; } }
 </style>

@@ -60,9 +60,13 @@ void tell_due(const HealthOptions& options, const CheckTimes& times,
     return;
   }
   if (!times.model || !times.check || static_cast<double>(*times.check - *times.model) < kDay) {
-    check.due_because = times.model && times.check
-                            ? "the model's own measurements are less than a day older"
-                            : "it is not known when the model and the check were measured";
+    check.due_because = "it is not known when the model and the check were measured";
+    if (!times.model || !times.check) return;
+    check.due = date_of(*times.model + kUsualInterval);
+    check.due_because = fmt::format(
+        "{} days after the model's own measurements, which are less than a day older than the "
+        "check",
+        kUsualInterval / 86400);
     return;
   }
   check.drift = DriftSeen{*times.model, *times.check, misfits()};
@@ -72,10 +76,12 @@ void tell_due(const HealthOptions& options, const CheckTimes& times,
   const DriftRate& rate = *check.drift_rate;
   if (rate.checks < kFewestChecks) {
     check.due_because = fmt::format(
-        "{}; a date needs {} checks of different days, so far there {} {}: until then check at the "
-        "usual interval",
+        "{}; to tell how fast it drifts needs {} checks of different days, so far there {} {}: "
+        "until "
+        "then every {} days",
         because_of(rate, static_cast<double>(*times.check - *times.model)), kFewestChecks,
-        rate.checks > 1 ? "are" : "is", rate.checks);
+        rate.checks > 1 ? "are" : "is", rate.checks, kUsualInterval / 86400);
+    check.due = date_of(*times.check + kUsualInterval);
     return;
   }
   constexpr double kFarthest = 2 * 365.25 * kDay;

@@ -22,8 +22,9 @@ struct CheckTimes {
                                                    const Eigen::VectorXd& residual);
 
 /// Sets the date of the next check: when the effect of the drift may exceed the tolerance (95 %) at
-/// the highest rate that all checks together leave likely (95 %). `misfits`: misfits_of_drift(),
-/// called if times are known.
+/// the highest rate that all checks together leave likely (95 %). While too few checks show a rate,
+/// kUsualInterval after the check (after the model, if both are of one day). `misfits`:
+/// misfits_of_drift(), called if times are known.
 void tell_due(const HealthOptions& options, const CheckTimes& times,
               const std::function<std::vector<double>()>& misfits, HealthCheck& check);
 

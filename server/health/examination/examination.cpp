@@ -91,11 +91,18 @@ void Examination::tell_rms(const RefittedRows& refitted) {
   const Eigen::VectorXd left = refitted.unwhitened(refitted.left(rows_.residual));
   const Eigen::MatrixXd expected = refitted.unwhitened_covariance();
   double square = 0, expected_square = 0;
+  const auto& bad = check_.suspects;
   for (std::size_t i = 0; i < rows_.poses(); ++i) {
-    const auto& bad = check_.suspects;
-    if (std::find(bad.begin(), bad.end(), rows_.pose_ids[i]) != bad.end()) continue;
-    square += left.segment<3>(rows_.first[i]).squaredNorm();
-    expected_square += expected.diagonal().segment<3>(rows_.first[i]).sum();
+    const Eigen::Index row = rows_.first[i];
+    const bool suspect = std::find(bad.begin(), bad.end(), rows_.pose_ids[i]) != bad.end();
+    // The refit takes a suspect pose out whole: its own distance is in the rows before it.
+    const Vector3 off = suspect ? rows_.residual.segment<3>(row) : left.segment<3>(row);
+    const double variance = expected.diagonal().segment<3>(row).sum();
+    check_.at_poses.push_back({rows_.pose_ids[i], rows_.predicted[i].translation(), off,
+                               std::sqrt(std::max(0.0, variance)), suspect});
+    if (suspect) continue;
+    square += off.squaredNorm();
+    expected_square += variance;
   }
   const auto count =
       static_cast<double>(std::max<std::size_t>(rows_.poses() - check_.suspects.size(), 1));
