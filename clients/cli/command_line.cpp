@@ -80,6 +80,7 @@ int tell_help(const CLI::App& app, const CLI::ParseError& asked) {
 
 void add_commands(CLI::App& app, Action& chosen) {
   add_plan_command(app, chosen);
+  add_view_command(app, chosen);
   add_pose_commands(app, chosen);
   add_measurement_commands(app, chosen);
   add_model_commands(app, chosen);

@@ -57,6 +57,7 @@ void add_doctor_command(CLI::App& app, Action& chosen);
 /// Adds help, completion and manual, which describe `app` as it is when they run; it outlives
 /// `chosen`.
 void add_help_commands(CLI::App& app, Action& chosen);
+void add_view_command(CLI::App& app, Action& chosen);
 void add_check_command(CLI::App& app, Action& chosen);
 void add_remedies_command(CLI::App& app, Action& chosen);
 void add_compare_command(CLI::App& app, Action& chosen);

@@ -135,6 +135,10 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
      "  trammel diagnose cell.yaml batch.csv --report page.html\n"
      "  trammel diagnose cell.yaml b.csv --next-poses next.csv\n"
      "  trammel diagnose cell.yaml b.csv --prove --report page.html"},
+    {"view",
+     "  trammel view cell.yaml -o cell.html\n"
+     "  trammel view cell.yaml plan.csv -o plan.html\n"
+     "  trammel view cell.yaml drill.mod -o drill.html"},
     {"remedies", "  trammel remedies cell.model -o remedies.html"},
     {"compare",
      "  trammel compare a.model b.model --batch fresh.csv --report page.html\n"

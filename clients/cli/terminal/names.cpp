@@ -47,6 +47,7 @@ const std::map<std::string, std::vector<Place>> kPlaces = {{"activate", {kVersio
                                                            {"simulate", {kCell}},
                                                            {"submit", {kCell, kBatch}},
                                                            {"train", {kCell, kBatch}},
+                                                           {"view", {kCell}},
                                                            {"watch", {kJob}}};
 
 bool is_bare(const std::string& word) {
