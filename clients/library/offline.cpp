@@ -7,6 +7,7 @@
 #include "clients/library/convert.h"
 #include "clients/library/inside.h"
 #include "server/base/coverage.h"
+#include "server/base/shown_value.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
@@ -26,8 +27,12 @@
 #include "server/plan/plan.h"
 #include "server/report/budget_json.h"
 #include "server/report/diagnosis_json.h"
+#include "server/report/health_json.h"
+#include "server/report/history.h"
+#include "server/report/model_page.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
+#include "server/tasks/check/check.h"
 #include "server/tasks/train/extend.h"
 #include "server/tasks/train/first_batch.h"
 #include "server/tasks/train/told_by_training.h"
@@ -136,6 +141,11 @@ trammel::Result<trammel::Target> target_from(const Target& asked, const Context&
   return target;
 }
 
+/// From a parameter's own number to the unit that people read: mm and deg.
+double scale_for_people(const trammel::Parameter& parameter) {
+  return parameter.scale * reading_of(parameter.unit).scale;
+}
+
 /// The ids that a model is asked with.
 trammel::Result<Context> known_context(const CompensatedModel& model, Context context) {
   TRY(library::check_context(context, model.cell().robot));
@@ -192,6 +202,30 @@ std::vector<std::string> Cell::tools() const {
   for (const auto& [id, tool] : inside_->cell->tools) ids.push_back(id);
   return ids;
 }
+Result<std::vector<Pose>> Cell::tool_poses(std::span<const double> joints_deg,
+                                           const std::string& tool) const {
+  const trammel::Cell& cell = *inside_->cell;
+  trammel::Pose X_FT = trammel::Pose::Identity();
+  if (tool != "flange") {
+    const auto known = resolve_tool(cell, tool);
+    if (!known) return passed_on(known);
+    const std::optional<trammel::Pose>& place = cell.tools.at(*known);
+    if (!place)
+      return tl::make_unexpected(
+          to_api(refused("where tool {} sits is not in the cell file", *known)
+                     .of("tool")
+                     .next("ask for tool flange, or give its pose")
+                     .value()));
+    X_FT = *place;
+  }
+  const auto all = library::all_joints_from_api(joints_deg, cell.robot);
+  if (!all) return passed_on(all);
+  std::vector<Pose> poses;
+  for (const JointVector& q : *all)
+    poses.push_back(exchange::from_si(cell.robot.flange_pose(q) * X_FT));
+  return poses;
+}
+
 std::vector<std::string> Cell::payloads() const {
   std::vector<std::string> ids;
   for (const auto& [id, payload] : inside_->cell->payloads) ids.push_back(id);
@@ -262,8 +296,8 @@ std::string Model::bias() const {
 std::vector<Parameter> Model::parameters() const {
   std::vector<Parameter> all;
   for (const IdentifiedParameter& p : inside_->model.parts().parameters) {
-    const double scale = p.parameter.scale;
-    all.push_back({p.parameter.name, p.parameter.unit, scale * p.value,
+    const double scale = scale_for_people(p.parameter);
+    all.push_back({p.parameter.name, reading_of(p.parameter.unit).unit, scale * p.value,
                    kExpanded * scale * p.stddev, p.identified});
   }
   return all;
@@ -275,7 +309,7 @@ std::vector<double> Model::parameter_covariance() const {
   for (Eigen::Index i = 0; i < parts.covariance.rows(); ++i) {
     for (Eigen::Index j = 0; j < parts.covariance.cols(); ++j) {
       const auto scale = [&](Eigen::Index k) {
-        return parts.parameters[static_cast<std::size_t>(k)].parameter.scale;
+        return scale_for_people(parts.parameters[static_cast<std::size_t>(k)].parameter);
       };
       all.push_back(scale(i) * scale(j) * parts.covariance(i, j));
     }
@@ -370,6 +404,72 @@ Result<Evaluation> Model::evaluate(std::span<const Batch> batches) const {
   const auto& rows = world->batch.measurements;
   told.trained_on = static_cast<int>(std::count_if(rows.begin(), rows.end(), learned));
   return told;
+}
+
+Result<std::vector<Residual>> Model::residuals(std::span<const Batch> batches) const {
+  const auto batch = checked(batches, inside_->model.cell(), drawn(0, 0));
+  if (!batch) return passed_on(batch);
+  const auto positions = require_positions(batch->rows(), "the library's residuals");
+  if (!positions) return passed_on(positions);
+  const auto world = in_world_of(inside_->model, batch->rows());
+  if (!world) return passed_on(world);
+  const MeasurementBatch rows = positions_of(world->batch);
+  const CompensatedModel::LevelErrors errors = inside_->model.errors_B(rows);
+  std::vector<Residual> all;
+  for (std::size_t i = 0; i < rows.measurements.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    all.push_back({rows.measurements[i].pose_id, mm_from_si(errors.nominal.col(column)),
+                   mm_from_si(errors.calibrated.col(column)),
+                   mm_from_si(errors.compensated.col(column)),
+                   mm_from_si(errors.stddev.col(column)), errors.in_domain[i]});
+  }
+  return all;
+}
+
+Result<std::string> Model::check(const Batch& batch, const CheckOptions& options) const {
+  const CompensatedModel& model = inside_->model;
+  const auto rows = check_against_cell(batch.inside().rows, model.cell());
+  if (!rows) return passed_on(rows);
+  CheckAsked asked;
+  if (options.tolerance_mm) asked.tolerance = *options.tolerance_mm * from_mm(1);
+  asked.new_tool = options.new_tool;
+  for (const std::string& earlier : options.earlier)
+    if (auto drift = drift_of(earlier)) asked.earlier.push_back(std::move(*drift));
+  const auto health = check_robot(model, model.cell(), *rows, std::move(asked));
+  if (!health) return passed_on(health);
+  return check_json(*health, *rows, model).dump();
+}
+
+Result<std::string> Model::report(std::span<const Batch> batches) const {
+  if (batches.empty()) return model_page(inside_->model, std::nullopt);
+  const auto batch = checked(batches, inside_->model.cell(), drawn(0, 0));
+  if (!batch) return passed_on(batch);
+  const auto positions = require_positions(batch->rows(), "the library's report");
+  if (!positions) return passed_on(positions);
+  auto world = in_world_of(inside_->model, batch->rows());
+  if (!world) return passed_on(world);
+  std::erase_if(world->batch.measurements, LearnedFrom(inside_->model, batch->hash()));
+  std::optional<MeasurementBatch> fresh;
+  if (!world->batch.measurements.empty()) fresh = std::move(world->batch);
+  return model_page(inside_->model, fresh);
+}
+
+Result<std::string> history(std::span<const Model> models) {
+  CellHistory all;
+  all.of_files = true;
+  for (const Model& one : models) {
+    const CompensatedModel& model = one.inside().model;
+    if (all.cell.empty()) all.cell = model.cell().name;
+    if (model.cell().name != all.cell)
+      return tl::make_unexpected(
+          to_api(failure(trammel::ErrorCode::kRefused,
+                         "the model is of cell {}, the ones before it are of {}", model.cell().name,
+                         all.cell)
+                     .of("models")
+                     .value()));
+    all.versions.push_back(on_record(model, static_cast<int>(all.versions.size()) + 1));
+  }
+  return history_json(all).dump();
 }
 
 Result<Model> train(const Cell& cell, std::span<const Batch> batches, const TrainOptions& options) {

@@ -103,6 +103,13 @@ Result<Session> Session::open(const SessionOptions& options) {
   if (!places)
     return tl::make_unexpected(library::to_api(Failure(places.error()).of("hosts").value()));
   how.servers = *std::move(places);
+  for (const std::string& one : options.discovery_servers) {
+    auto place = parse_host_port(one, kDiscoveryPort);
+    if (!place)
+      return tl::make_unexpected(
+          library::to_api(Failure(place.error()).of("discovery_servers").value()));
+    how.discovery_servers.push_back(*std::move(place));
+  }
   auto session = client::Session::open(how);
   if (!session) return passed_on(session);
   auto inside = std::make_unique<Inside>();
@@ -219,6 +226,35 @@ Result<std::vector<Job>> Session::jobs(const std::string& cell) const {
   const auto jobs = inside_->session->jobs(cell);
   if (!jobs) return passed_on(jobs);
   return each<Job>(*jobs, [](const client::DatedJob& job) { return job_of(job.status); });
+}
+
+Status Session::cancel(std::int64_t job) const {
+  const auto done = inside_->session->cancel(job);
+  if (!done) return passed_on(done);
+  return {};
+}
+
+Result<std::vector<StoredBatch>> Session::batches(const std::string& cell) const {
+  const auto all = inside_->session->batches(cell);
+  if (!all) return passed_on(all);
+  return each<StoredBatch>(*all, [](const client::BatchOfService& one) {
+    return StoredBatch{one.cell,   one.batch, one.reason,          one.hash,
+                       one.server, one.poses, one.accepted_unix_s, one.learned};
+  });
+}
+
+Result<std::string> Session::export_batch(const std::string& cell,
+                                          const std::string& batch_id) const {
+  const auto text = inside_->session->export_batch(cell, batch_id);
+  if (!text) return passed_on(text);
+  return *text;
+}
+
+Result<std::vector<std::string>> Session::audit(const std::string& cell, std::int64_t since_unix_s,
+                                                std::size_t most) const {
+  const auto all = inside_->session->audit(cell, since_unix_s, most);
+  if (!all) return passed_on(all);
+  return each<std::string>(*all, [](const client::AuditText& one) { return one.json; });
 }
 
 namespace {

@@ -261,6 +261,22 @@ py::dict to_python(const api::Server& server) {
                   "uptime_s"_a = server.uptime_s, "queued_jobs"_a = server.queued_jobs);
 }
 
+py::dict to_python(const api::StoredBatch& batch) {
+  return py::dict("cell"_a = batch.cell, "id"_a = batch.id, "kept_out"_a = batch.kept_out,
+                  "hash"_a = batch.hash, "server"_a = batch.server, "poses"_a = batch.poses,
+                  "accepted_unix_s"_a = batch.accepted_unix_s, "learned"_a = batch.learned);
+}
+
+py::dict to_python(const std::vector<api::Residual>& items) {
+  using R = api::Residual;
+  return py::dict("pose_id"_a = texts(items, [](const R& r) { return r.pose_id; }),
+                  "nominal_mm"_a = figure_of(items, &R::nominal_mm),
+                  "calibrated_mm"_a = figure_of(items, &R::calibrated_mm),
+                  "compensated_mm"_a = figure_of(items, &R::compensated_mm),
+                  "stddev_mm"_a = figure_of(items, &R::stddev_mm),
+                  "in_domain"_a = figure_of(items, &R::in_domain));
+}
+
 template <typename T>
 py::list list_of(const std::vector<T>& items) {
   return texts(items, [](const T& item) { return to_python(item); });
@@ -322,6 +338,11 @@ api::Context context_of(std::string tool, std::string payload, std::vector<int> 
   return {std::move(tool), std::move(payload), std::move(directions), temperature_c};
 }
 
+/// A pose alone, as a row of an array.
+struct At {
+  api::Pose pose;
+};
+
 void add_files(py::module_& m) {
   py::class_<api::Cell>(m, "Cell")
       .def_static(
@@ -335,7 +356,18 @@ void add_files(py::module_& m) {
       .def("joints", &api::Cell::joints)
       .def("joint_columns", &api::Cell::joint_columns)
       .def("tools", &api::Cell::tools)
-      .def("payloads", &api::Cell::payloads);
+      .def("payloads", &api::Cell::payloads)
+      .def(
+          "tool_poses",
+          [](const api::Cell& cell, const Numbers& joints_deg, const std::string& tool) {
+            const std::vector<double> joints = joints_of(joints_deg, "joints_deg", cell.joints());
+            const auto poses =
+                value_or_raise(unlocked([&] { return cell.tool_poses(joints, tool); }));
+            std::vector<At> at;
+            for (const api::Pose& pose : poses) at.push_back({pose});
+            return figure_of(at, &At::pose);
+          },
+          "joints_deg"_a, "tool"_a);
   py::class_<api::Batch>(m, "Batch")
       .def_static(
           "load",
@@ -456,7 +488,53 @@ void add_model_work(py::class_<api::Model>& type) {
           "batches"_a);
 }
 
+void add_model_answers(py::class_<api::Model>& type) {
+  type.def(
+          "residuals",
+          [](const api::Model& model, const std::vector<api::Batch>& batches) {
+            return to_python(value_or_raise(unlocked([&] { return model.residuals(batches); })));
+          },
+          "batches"_a)
+      .def(
+          "check",
+          [](const api::Model& model, const api::Batch& batch, std::optional<double> tolerance_mm,
+             bool new_tool, std::vector<std::string> earlier) {
+            const api::CheckOptions options{tolerance_mm, new_tool, std::move(earlier)};
+            return value_or_raise(unlocked([&] { return model.check(batch, options); }));
+          },
+          "batch"_a, "tolerance_mm"_a, "new_tool"_a, "earlier"_a)
+      .def(
+          "report",
+          [](const api::Model& model, const std::vector<api::Batch>& batches) {
+            return value_or_raise(unlocked([&] { return model.report(batches); }));
+          },
+          "batches"_a)
+      .def(
+          "correct_program",
+          [](const api::Model& model, const std::vector<std::pair<std::string, py::bytes>>& files,
+             std::string format, std::string tool, std::string payload, bool keep_digits) {
+            std::vector<api::ProgramFile> program;
+            for (const auto& [name, text] : files) program.push_back({name, std::string(text)});
+            const api::ProgramOptions options{std::move(format), std::move(tool),
+                                              std::move(payload), keep_digits};
+            const auto corrected =
+                value_or_raise(unlocked([&] { return model.correct_program(program, options); }));
+            py::list out;
+            for (const api::ProgramFile& file : corrected.files)
+              out.append(py::make_tuple(file.name, py::bytes(file.text)));
+            return py::make_tuple(out, corrected.receipt_csv, corrected.receipt_json,
+                                  corrected.all);
+          },
+          "files"_a, "format"_a, "tool"_a, "payload"_a, "keep_digits"_a);
+}
+
 void add_work(py::module_& m) {
+  m.def(
+      "history",
+      [](const std::vector<api::Model>& models) {
+        return value_or_raise(unlocked([&] { return api::history(models); }));
+      },
+      "models"_a);
   m.def(
       "train",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches,
@@ -543,16 +621,42 @@ void add_session_state(py::class_<Session>& session) {
       .def_static(
           "open",
           [](std::uint32_t domain, std::vector<std::uint16_t> ports, double timeout_s,
-             std::vector<std::string> hosts, std::string security) {
-            const api::SessionOptions options{domain, std::move(ports), milliseconds(timeout_s),
-                                              std::move(hosts), std::move(security)};
+             std::vector<std::string> hosts, std::string security,
+             std::vector<std::string> discovery_servers) {
+            const api::SessionOptions options{
+                domain,           std::move(ports),    milliseconds(timeout_s),
+                std::move(hosts), std::move(security), std::move(discovery_servers)};
             return value_or_raise(unlocked([&] { return Session::open(options); }));
           },
-          "domain"_a, "ports"_a, "timeout_s"_a, "hosts"_a, "security"_a)
+          "domain"_a, "ports"_a, "timeout_s"_a, "hosts"_a, "security"_a, "discovery_servers"_a)
       .def("servers",
            [](const Session& s) {
              return list_of(value_or_raise(unlocked([&] { return s.servers(); })));
            })
+      .def(
+          "batches",
+          [](const Session& s, const std::string& cell) {
+            return list_of(value_or_raise(unlocked([&] { return s.batches(cell); })));
+          },
+          "cell"_a)
+      .def(
+          "export_batch",
+          [](const Session& s, const std::string& cell, const std::string& batch_id) {
+            return value_or_raise(unlocked([&] { return s.export_batch(cell, batch_id); }));
+          },
+          "cell"_a, "batch_id"_a)
+      .def(
+          "audit",
+          [](const Session& s, const std::string& cell, std::int64_t since, std::size_t most) {
+            return value_or_raise(unlocked([&] { return s.audit(cell, since, most); }));
+          },
+          "cell"_a, "since_unix_s"_a, "most"_a)
+      .def(
+          "cancel",
+          [](const Session& s, std::int64_t job) {
+            value_or_raise(unlocked([&] { return s.cancel(job); }));
+          },
+          "job"_a)
       .def(
           "models",
           [](const Session& s, const std::string& cell) {
@@ -713,7 +817,9 @@ PYBIND11_MODULE(_trammel, m) {
   py::class_<api::Model> model(m, "Model");
   add_model_file(model);
   add_model_work(model);
+  add_model_answers(model);
   add_work(m);
+  m.attr("version") = TRAMMEL_VERSION;
   py::class_<Session> session(m, "Session");
   add_session_state(session);
   add_session_work(session);

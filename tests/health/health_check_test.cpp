@@ -108,7 +108,8 @@ TEST_F(HealthTest, WhenTheNextCheckIsDueFollowsFromAllChecksThatWereMade) {
     EXPECT_NEAR(std::sqrt(squares / check.poses), check.rms, 1e-12) << "poses add up to the rms";
     EXPECT_EQ(check.due_because.find("until then every 30 days") != std::string::npos, month < 3)
         << "two checks are no rate: " << check.due_because;
-    if (month < 3) EXPECT_EQ(check.due, shown_day(*batch.measured_at + kUsualInterval));
+    const std::string usual = shown_day(*batch.measured_at + kUsualInterval);
+    EXPECT_TRUE(month >= 3 || check.due == usual) << check.due;
     const std::string text = health_json(check, {}).dump();
     const auto read = drift_of(text);
     ASSERT_TRUE(read) << text;

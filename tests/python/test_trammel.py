@@ -186,6 +186,37 @@ class Offline(unittest.TestCase):
         by_branch = self.model.correct(targets.assign(conf=0))
         np.testing.assert_allclose(by_branch.joints_deg, self.model.correct(nominal, conf=0).joints_deg, equal_nan=True)
 
+    def test_parameters_are_in_mm_and_deg(self):
+        units = {parameter["unit"] for parameter in self.model.parameters()}
+        self.assertFalse(units & {"m", "rad"}, units)
+        self.assertTrue({"mm", "deg"} & units, units)
+
+    def test_tools_are_where_the_drawing_has_them_without_a_model(self):
+        joints = self.planned.joints_deg[:5]
+        np.testing.assert_allclose(self.cell.tool_poses(joints)[:, :3], self.model.predict(joints).nominal[:, :3], atol=1e-6)
+        flange = self.cell.tool_poses(joints, "flange")
+        self.assertGreater(np.linalg.norm(flange[:, :3] - self.cell.tool_poses(joints)[:, :3], axis=1).min(), 1)
+        with self.assertRaises(trammel.TrammelError):
+            self.cell.tool_poses(joints, "hammer")
+
+    def test_residuals_of_each_pose_add_up_to_the_evaluation(self):
+        residuals = self.model.residuals(self.batch)
+        figures = self.model.evaluate(self.batch)
+        self.assertEqual(len(residuals), figures["poses"])
+        for level in ("nominal", "calibrated", "compensated"):
+            rms = np.sqrt(np.mean(np.sum(getattr(residuals, f"{level}_mm") ** 2, axis=1)))
+            self.assertAlmostEqual(rms, figures["levels"][level]["rms_mm"], places=9)
+
+    def test_a_check_a_page_and_a_history_are_those_of_the_command_line(self):
+        few = trammel.simulate(self.cell, TRUTH, trammel.plan(self.cell, 12, criterion="check"), seed=9)
+        health = self.model.check(few, tolerance_mm=1)
+        self.assertIn(health["verdict"], ("healthy", "cannot_tell"))
+        self.assertEqual(len(health["at_poses"]), 12)
+        again = self.model.check(few, tolerance_mm=1, earlier=[health])
+        self.assertEqual(again["verdict"], health["verdict"])
+        self.assertIn(self.model.id, self.model.report())
+        self.assertEqual(trammel.history([self.model, self.model])["versions"][1]["model"], self.model.id)
+
     def test_parameters_have_a_covariance_in_their_units(self):
         u95 = np.array([parameter["u95"] for parameter in self.model.parameters])
         np.testing.assert_allclose(2 * np.sqrt(np.diag(self.model.parameter_covariance)), u95, rtol=1e-6)
@@ -520,6 +551,19 @@ class Service(unittest.TestCase):
         self.assertTrue(self.ended["in_force"], self.ended)
         self.assertIn(self.ended["id"], [job["id"] for job in self.session.jobs("cell-7")])
         self.assertTrue(self.session.models()[0]["in_force"])
+
+    def test_batches_audit_and_jobs_are_read_and_cancelled(self):
+        batches = self.session.batches("cell-7")
+        self.assertEqual(batches[0]["poses"], 60)
+        self.assertEqual(batches[0]["kept_out"], "")
+        again = self.session.export_batch("cell-7", batches[0]["id"])
+        self.assertEqual(len(again), 60)
+        trail = self.session.audit("cell-7")
+        self.assertIn("batch", {row["what"] for row in trail[0]["rows"]}, trail[0])
+        with self.assertRaises(trammel.TrammelError):
+            self.session.cancel(self.ended["id"])
+        with self.assertRaises(trammel.Usage):
+            trammel.Session(discovery_servers="no such host:x")
 
     def test_what_is_no_session_and_no_list_of_joints_is_refused(self):
         for wrong in (dict(domain=233), dict(timeout_s=float("inf")), dict(timeout_s=float("nan")), dict(timeout_s=0)):
@@ -857,6 +901,26 @@ class Documents(unittest.TestCase):
         done = subprocess.run([sys.executable, script, SOURCE], capture_output=True, text=True)
         self.assertEqual(done.stderr, "")
         self.assertEqual(done.stdout.splitlines(), said)
+
+    def test_the_notebook_goes_from_a_batch_to_a_corrected_program_with_its_plots(self):
+        script = SOURCE / "clients/python/examples/notebook.py"
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder)
+            done = subprocess.run([sys.executable, script, SOURCE, out], capture_output=True, text=True)
+            self.assertEqual(done.stderr, "")
+            self.assertIn("10 of 10 targets corrected", done.stdout)
+            self.assertIn("drill.mod: all targets corrected", done.stdout)
+            self.assertRegex(done.stdout, r"mm nominal, 0\.0\d mm compensated")
+            for plot in ("residuals.svg", "targets.svg"):
+                self.assertGreaterEqual((out / plot).read_text().count("<circle"), 20, plot)
+            self.assertIn("Good to ", (out / "model.html").read_text())
+            before, after = (SOURCE / "config/programs/drill.mod").read_bytes(), (out / "program/drill.mod").read_bytes()
+            self.assertNotEqual(before, after)
+            self.assertIn(b"MODULE", after)
+
+    def test_what_dir_lists_is_what_is_meant_for_users(self):
+        self.assertEqual(sorted(trammel.__all__), dir(trammel))
+        self.assertRegex(trammel.__version__, r"^\d+\.\d+\.\d+$")
 
     def test_stubs_fit_the_module_and_types_fit_the_stubs(self):
         package = pathlib.Path(trammel.__file__).parent

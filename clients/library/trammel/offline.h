@@ -33,6 +33,11 @@ class TRAMMEL_API Cell {
   [[nodiscard]] std::vector<std::string> tools() const;
   /// Ids of its payloads.
   [[nodiscard]] std::vector<std::string> payloads() const;
+  /// Where the nominal robot has the tool (X_BT) at N joint vectors, given one after the other (N x
+  /// n values, deg; for a rail mm). `tool`: empty: the cell's only one; `flange`: no tool. Refuses
+  /// a tool whose place is not known.
+  [[nodiscard]] Result<std::vector<Pose>> tool_poses(std::span<const double> joints_deg,
+                                                     const std::string& tool = {}) const;
 
   /// The parts that it is made of.
   struct Inside;
@@ -115,7 +120,7 @@ struct Evaluation {
 /// One identified parameter of a model.
 struct Parameter {
   std::string name;         ///< as in files: `gamma0`, `C2`
-  std::string unit;         ///< of value and u95
+  std::string unit;         ///< of value and u95: lengths mm, angles deg
   double value = 0;         ///< the correction to the drawing
   double u95 = 0;           ///< two standard uncertainties
   bool identified = false;  ///< true if the poses determine it better than the prior did
@@ -134,6 +139,44 @@ struct Measured {
   double volume_m3 = 0;            ///< of the box, the part within reach of a measured tool place
   std::optional<double> reach_mm;  ///< mm: a pose farther from all measured places is out of domain
   std::string instrument;          ///< its name in the cell file, with its stated sigma
+};
+
+/// What is left of a measured pose, measured - predicted, in B.
+struct Residual {
+  std::string pose_id;                        ///< its name in the batch
+  std::array<double, 3> nominal_mm = {};      ///< against the robot as drawn
+  std::array<double, 3> calibrated_mm = {};   ///< with the identified parameters
+  std::array<double, 3> compensated_mm = {};  ///< with the learned bias, too
+  std::array<double, 3> stddev_mm = {};       ///< as predicted, of compensated
+  bool in_domain = false;                     ///< the model knows enough there
+};
+
+/// The options of a health check.
+struct CheckOptions {
+  std::optional<double> tolerance_mm = {};  ///< what the cell must hold; empty: its file's
+  bool new_tool = false;  ///< the tool was mounted anew: where it sits is found, and is no change
+  std::vector<std::string> earlier = {};  ///< what earlier checks of this robot said (JSON)
+};
+
+/// A file of a robot program.
+struct ProgramFile {
+  std::string name;  ///< with its ending, by which the dialect is known
+  std::string text;  ///< its bytes
+};
+
+/// The options of the correction of a program.
+struct ProgramOptions {
+  std::string format;         ///< the dialect; empty: by the endings
+  std::string tool, payload;  ///< of the cell; empty: as the program says, or the only ones
+  bool keep_digits = false;   ///< numbers keep their decimals, whatever rounding costs
+};
+
+/// A corrected program.
+struct CorrectedFiles {
+  std::vector<ProgramFile> files;  ///< every byte that is no corrected number as it was
+  std::string receipt_csv;         ///< a row for each target, as `trammel correct --receipt` has it
+  std::string receipt_json;        ///< the same for programs
+  bool all = false;                ///< every target is corrected
 };
 
 /// Nominal chain, identified error sources and learned bias.
@@ -180,6 +223,18 @@ class TRAMMEL_API Model {
                                                              const Context& context = {}) const;
   /// Measured against predicted. Several batches are sessions of one arm.
   [[nodiscard]] Result<Evaluation> evaluate(std::span<const Batch> batches) const;
+  /// The same pose by pose, as `trammel evaluate --residuals` has it.
+  [[nodiscard]] Result<std::vector<Residual>> residuals(std::span<const Batch> batches) const;
+  /// Whether the robot is still the one that the model was trained on: JSON, as `trammel check
+  /// --json`.
+  [[nodiscard]] Result<std::string> check(const Batch& batch,
+                                          const CheckOptions& options = {}) const;
+  /// The model's page: HTML that opens without a network, as `trammel report` writes it. `batches`:
+  /// fresh measurements to compare it with; poses that it was trained on are left out.
+  [[nodiscard]] Result<std::string> report(std::span<const Batch> batches = {}) const;
+  /// Corrects a robot program as `trammel correct` does.
+  [[nodiscard]] Result<CorrectedFiles> correct_program(std::span<const ProgramFile> files,
+                                                       const ProgramOptions& options = {}) const;
 
   /// The parts that it is made of.
   struct Inside;
@@ -191,6 +246,10 @@ class TRAMMEL_API Model {
  private:
   std::shared_ptr<const Inside> inside_;
 };
+
+/// What a cell went through, over models of it, the oldest first: JSON, as `trammel history
+/// --json`.
+[[nodiscard]] TRAMMEL_API Result<std::string> history(std::span<const Model> models);
 
 /// The options of a training.
 struct TrainOptions {

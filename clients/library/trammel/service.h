@@ -27,6 +27,9 @@ struct SessionOptions {
   /// Folder with the certificate, key and permissions that a secured service asks for; empty:
   /// without.
   std::string security = {};
+  /// Discovery servers that tell where more servers are, as `host` or `host:port`; their order is
+  /// their number. At most half the timeout is waited for them.
+  std::vector<std::string> discovery_servers = {};
 };
 
 /// The subject of a call.
@@ -58,6 +61,18 @@ struct Job {
   std::string next;       ///< the next step for the user, as one clause
   std::string held_back;  ///< why a person decides about it: `few_judges stop_note step_limit`;
                           ///< empty: the poses held out decide
+};
+
+/// A batch that a service has.
+struct StoredBatch {
+  std::string cell;                  ///< its cell
+  std::string id;                    ///< its name
+  std::string kept_out;              ///< why nothing learns from it; empty: it is not kept out
+  std::string hash;                  ///< SHA-256 of its text
+  std::string server;                ///< the server that states this
+  int poses = 0;                     ///< how many it has
+  std::int64_t accepted_unix_s = 0;  ///< when it came, Unix time, s
+  bool learned = false;              ///< later trainings may learn from it
 };
 
 /// A server, by its last status.
@@ -132,6 +147,18 @@ class TRAMMEL_API Session {
                                      const std::function<void(const Job&)>& listener = {}) const;
   /// Jobs that wait or run or ended lately, of one cell or (empty) of all, oldest first.
   [[nodiscard]] Result<std::vector<Job>> jobs(const std::string& cell) const;
+  /// A waiting job does not begin; a running one stops as soon as it can. kConflict: it has ended.
+  [[nodiscard]] Status cancel(std::int64_t job) const;
+  /// The batches of one cell or (empty) of all, oldest first.
+  [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
+  /// A batch's text as it came.
+  [[nodiscard]] Result<std::string> export_batch(const std::string& cell,
+                                                 const std::string& batch_id) const;
+  /// The changes and their authors, for one cell or (empty) for all, since then (Unix time, s), the
+  /// newest `most` (0: all): JSON of each server, as `trammel audit --json` has its `trails`.
+  [[nodiscard]] Result<std::vector<std::string>> audit(const std::string& cell,
+                                                       std::int64_t since_unix_s = 0,
+                                                       std::size_t most = 0) const;
   /// Puts a version in force. Refused if `expected_version` is not in force. Refused, unless
   /// `force` is set, if it is worse than the version in force or cannot be judged. `reason` is for
   /// the audit trail.

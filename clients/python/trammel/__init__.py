@@ -1,6 +1,6 @@
 """Trammel: an industrial robot lands where it was told to.
 
-Offline, on files:  `Cell`, `Batch`, `Model`, `train`, `diagnose`, `extend`, `plan`, `simulate`.
+Offline, on files:  `Cell`, `Batch`, `Model`, `train`, `diagnose`, `extend`, `plan`, `simulate`, `history`.
 A running service:  `Session`.
 What goes wrong:    `TrammelError` and its kinds, with code, file, row, column, value and limit.
 
@@ -29,9 +29,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "Batch", "Busy", "Cell", "Conflict", "Corrections", "Extension", "Internal", "Model", "NotFound", "Plan", "Predictions", "Refused",
-    "Session", "TooLarge", "TrammelError", "Unreachable", "Usage", "diagnose", "extend", "plan", "simulate", "train",
+    "Batch", "Busy", "Cell", "Conflict", "CorrectedProgram", "Corrections", "Extension", "Internal", "Model", "NotFound", "Plan",
+    "Predictions", "Refused", "Residuals", "Session", "TooLarge", "TrammelError", "Unreachable", "Usage", "__version__", "diagnose",
+    "extend", "history", "plan", "simulate", "train",
 ]
+
+__version__: str = _trammel.version
+
+
+def __dir__() -> List[str]:
+    """The names that are meant for users."""
+    return sorted(__all__)
+
 
 Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[str, float], object]  #: told what is being done and the share done, [0, 1]; may raise to give up
@@ -184,6 +193,44 @@ class Corrections:
 
 
 @dataclasses.dataclass(frozen=True)
+class Residuals:
+    """What is left of N measured poses, measured - predicted; vectors in B."""
+
+    pose_id: List[str]  #: N
+    nominal_mm: Floats  #: (N, 3): against the robot as drawn
+    calibrated_mm: Floats  #: (N, 3): with the identified parameters
+    compensated_mm: Floats  #: (N, 3): with the learned bias, too
+    stddev_mm: Floats  #: (N, 3): as predicted, of compensated
+    in_domain: npt.NDArray[np.bool_]  #: (N,)
+
+    def __len__(self) -> int:
+        return len(self.pose_id)
+
+    def frame(self) -> "pd.DataFrame":
+        """A pandas frame, a row a pose: `pose_id`, `dx_mm dy_mm dz_mm` that are left, and the length at each level."""
+        lengths = {f"{level}_mm": np.linalg.norm(getattr(self, f"{level}_mm"), axis=1)
+                   for level in ("nominal", "calibrated", "compensated")}
+        return _frame({"pose_id": self.pose_id, **_column_by_column(("dx_mm", "dy_mm", "dz_mm"), self.compensated_mm),
+                       **lengths, "in_domain": self.in_domain})
+
+
+@dataclasses.dataclass(frozen=True)
+class CorrectedProgram:
+    """A robot program with corrected targets; all other bytes are as they were."""
+
+    files: Dict[str, bytes]  #: by name
+    receipt_csv: str  #: a row for each target, as `trammel correct --receipt` writes it
+    receipt: Dict[str, Any]  #: the same as data, with the keys of `trammel correct --json`
+    complete: bool  #: every target is corrected
+
+    def frame(self) -> "pd.DataFrame":
+        """The receipt as a pandas frame."""
+        import pandas
+
+        return pandas.read_csv(io.StringIO(self.receipt_csv))
+
+
+@dataclasses.dataclass(frozen=True)
 class Plan:
     """N poses to measure."""
 
@@ -230,6 +277,13 @@ class Cell:
     def payloads(self) -> List[str]:
         """Ids of its payloads."""
         return self._inside.payloads()
+
+    def tool_poses(self, joints_deg: Table, tool: str = "") -> Floats:
+        """(N, 7): X_BT, where the nominal robot has the tool; no model is needed. `joints_deg` (N, n) or (n,), deg, of rails
+        mm. `tool`: empty: the cell's only one; `flange`: none."""
+        frame = Frame.of(joints_deg, "joints_deg")
+        joints = floats(joints_deg, "joints_deg") if frame is None else frame.needed_joints(self._inside.joint_columns())
+        return self._inside.tool_poses(joints, tool)
 
     def __repr__(self) -> str:
         return f"<Cell {self.name}: {self.robot}, {self.joints} joints>"
@@ -448,6 +502,47 @@ class Model:
         """Measured against predicted, with the keys of `trammel evaluate --json`; mm and deg."""
         return self._inside.evaluate(_inside_of(batches))
 
+    def residuals(self, batches: Batches) -> "Residuals":
+        """What is left of each measured pose, as `trammel evaluate --residuals` writes it."""
+        return Residuals(**self._inside.residuals(_inside_of(batches)))
+
+    def check(self, batch: Batch, tolerance_mm: Optional[float] = None, new_tool: bool = False,
+              earlier: Sequence[Mapping[str, Any]] = ()) -> Dict[str, Any]:
+        """Whether the robot is still the one that the model was trained on, by a few poses, with the keys of
+        `trammel check --json`. `earlier`: what earlier checks of this robot returned; the next one is due by all of them."""
+        told = [json.dumps(dict(one)) for one in earlier]
+        found: Dict[str, Any] = json.loads(self._inside.check(_inside_of(batch)[0], tolerance_mm, new_tool, told))
+        return found
+
+    def report(self, path: Optional[Path] = None, batches: Optional[Batches] = None) -> str:
+        """The model's page, as `trammel report` writes it: HTML that opens without a network; written to `path` where one is
+        given. `batches`: fresh measurements to compare the model with."""
+        page = self._inside.report([] if batches is None else _inside_of(batches))
+        if path is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(page)
+        return page
+
+    def correct_program(self, files: Union[Path, Sequence[Path]], output: Optional[Path] = None, format: str = "", tool: str = "",
+                        payload: str = "", keep_digits: bool = False) -> "CorrectedProgram":
+        """Corrects a robot program of one or more files as `trammel correct` does; `output`: the folder to write it into.
+        `format`: the dialect, where the ending does not tell it."""
+        paths = [files] if isinstance(files, (str, os.PathLike)) else list(files)
+        program = []
+        for path in paths:
+            with open(path, "rb") as file:
+                program.append((os.path.basename(os.fspath(path)), file.read()))
+        corrected, receipt, told, whole_ = self._inside.correct_program(program, format, tool, payload, keep_digits)
+        if output is not None:
+            os.makedirs(output, exist_ok=True)
+            for name, text in corrected:
+                target = os.path.join(output, name)
+                if any(os.path.exists(target) and os.path.samefile(target, path) for path in paths):
+                    raise Usage(f"output: {target} is the program itself")
+                with open(target, "wb") as file:
+                    file.write(text)
+        return CorrectedProgram(dict(corrected), receipt, json.loads(told), whole_)
+
 
 def train(cell: Cell, batches: Batches, level: Optional[str] = None, bias: Optional[str] = None, seed: int = 1,
           validation_share: float = 0.0, progress: Optional[Progress] = None, as_read: bool = False,
@@ -483,6 +578,12 @@ def extend(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progr
     return Extension(json.loads(findings), None if model is None else Model(model), error_sources, why_not)
 
 
+def history(models: Sequence[Model]) -> Dict[str, Any]:
+    """What a cell went through, over models of it, the oldest first, with the keys of `trammel history --json`."""
+    told: Dict[str, Any] = json.loads(_trammel.history([model._inside for model in models]))
+    return told
+
+
 def plan(cell: Cell, count: int, seed: int = 1, criterion: str = "lhs", positions_only: bool = False) -> Plan:
     """`count` poses to measure, inside the cell's workspace and in sight of its tracker. `criterion`: `lhs`,
     `observability`, `separate:CAUSE,CAUSE`, `check`. `positions_only`: for a single reflector."""
@@ -502,15 +603,18 @@ class Session:
 
     `hosts`: where its servers are, names or IPv4 addresses, with `:port` behind them or not; empty: this host, on
     127.0.0.1. `ports`: those of each host that is named without one. `security`: the folder with certificate, key and
-    permissions that a secured service asks for.
+    permissions that a secured service asks for. `discovery_servers`: those that tell where servers are, names or IPv4
+    addresses with `:port` behind them or not; their order is their number.
     """
 
     def __init__(self, domain: int = 0, ports: Sequence[int] = (17500,), timeout_s: float = 5.0,
-                 hosts: Union[str, Sequence[str]] = (), security: Path = "") -> None:
+                 hosts: Union[str, Sequence[str]] = (), security: Path = "",
+                 discovery_servers: Union[str, Sequence[str]] = ()) -> None:
         if not 0 < timeout_s < float("inf"):
             raise Usage(f"timeout_s is {timeout_s}: a number of seconds above 0 is needed")
         named = [hosts] if isinstance(hosts, str) else list(hosts)
-        self._inside = _trammel.Session.open(domain, list(ports), timeout_s, named, os.fspath(security))
+        told_by = [discovery_servers] if isinstance(discovery_servers, str) else list(discovery_servers)
+        self._inside = _trammel.Session.open(domain, list(ports), timeout_s, named, os.fspath(security), told_by)
 
     def status(self) -> List[Dict[str, Any]]:
         """The servers that are there: `id version state cells trouble uptime_s queued_jobs`."""
@@ -589,6 +693,24 @@ class Session:
     def jobs(self, cell: str = "") -> List[Dict[str, Any]]:
         """Jobs that wait or run or ended lately, oldest first."""
         return self._inside.jobs(cell)
+
+    def cancel(self, job: int) -> None:
+        """A waiting job does not begin; a running one stops as soon as it can. `Conflict`: it has ended."""
+        self._inside.cancel(job)
+
+    def batches(self, cell: str = "") -> List[Dict[str, Any]]:
+        """The batches of a cell or of all, oldest first: `cell id kept_out hash server poses accepted_unix_s learned`;
+        `kept_out`: why nothing learns from it, empty: it is not."""
+        return self._inside.batches(cell)
+
+    def export_batch(self, cell: str, batch_id: str) -> Batch:
+        """A batch as it came."""
+        return Batch.parse(self._inside.export_batch(cell, batch_id), batch_id)
+
+    def audit(self, cell: str = "", since_unix_s: int = 0, most: int = 0) -> List[Dict[str, Any]]:
+        """The changes and their authors, the trail of each server: the newest `most` (0: all) since then."""
+        trails: List[Dict[str, Any]] = [json.loads(text) for text in self._inside.audit(cell, since_unix_s, most)]
+        return trails
 
     def activate(self, cell: str, version: int, reason: str = "", expected_version: Optional[int] = None,
                  force: bool = False) -> int:
