@@ -54,7 +54,7 @@ if(TARGET trammel_python)
   install(TARGETS trammel_python LIBRARY DESTINATION ${python_dir} COMPONENT python)
   install(DIRECTORY clients/python/trammel/ DESTINATION ${python_dir} COMPONENT python
     FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed")
-  install(FILES clients/python/examples/tour.py DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-trammel COMPONENT python)
+  install(FILES clients/python/examples/tour.py clients/python/examples/notebook.py DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-trammel COMPONENT python)
 endif()
 
 # The rooms: find_package(trammel COMPONENTS session offline). `common` comes with both. Rooms above the trainer are the daemon's own.

@@ -187,7 +187,7 @@ class Offline(unittest.TestCase):
         np.testing.assert_allclose(by_branch.joints_deg, self.model.correct(nominal, conf=0).joints_deg, equal_nan=True)
 
     def test_parameters_are_in_mm_and_deg(self):
-        units = {parameter["unit"] for parameter in self.model.parameters()}
+        units = {parameter["unit"] for parameter in self.model.parameters}
         self.assertFalse(units & {"m", "rad"}, units)
         self.assertTrue({"mm", "deg"} & units, units)
 
@@ -929,9 +929,10 @@ class Documents(unittest.TestCase):
         if "No module named mypy" in done.stderr:
             self.skipTest("no mypy here")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        done = subprocess.run([sys.executable, *mypy, str(SOURCE / "clients/python/examples/tour.py")], capture_output=True, text=True,
-                              cwd=package.parent)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        for script in ("tour.py", "notebook.py"):
+            done = subprocess.run([sys.executable, *mypy, str(SOURCE / "clients/python/examples" / script)], capture_output=True, text=True,
+                                  cwd=package.parent)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         allowed = pathlib.Path(__file__).with_name("stubtest_allowed.txt")
         done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "trammel._trammel", "--ignore-missing-stub",
                                "--allowlist", str(allowed)], capture_output=True, text=True, cwd=package.parent)
