@@ -130,10 +130,10 @@ std::string verdict_on(const std::vector<std::pair<std::string, CellNeed>>& need
     if (need.urgency == CellNeed::Urgency::kSoon) soon.push_back(cell);
   }
   const std::size_t fine = needs.size() - now.size() - soon.size();
-  std::string text = needs.size() == 1 && fine == 1
-                         ? "Its cell is fine"
-                         : fmt::format("{} of {} cell{} {} fine", fine, needs.size(),
-                                       needs.size() == 1 ? "" : "s", fine == 1 ? "is" : "are");
+  std::string text = needs.size() == 1 ? (fine == 1 ? "Its cell is fine" : "Its cell is not fine")
+                     : fine == 0       ? fmt::format("None of {} cells is fine", needs.size())
+                                       : fmt::format("{} of {} cells {} fine", fine, needs.size(),
+                                               fine == 1 ? "is" : "are");
   if (!now.empty()) text += fmt::format("; act now: {}", fmt::join(now, ", "));
   if (!soon.empty()) text += fmt::format("; see to: {}", fmt::join(soon, ", "));
   return text + ".";

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 
@@ -66,11 +67,32 @@ class PagesTest : public testing::Test {
 };
 
 TEST_F(PagesTest, TheFleetSaysWhichCellsAreDarkAndWhy) {
-  EXPECT_NE(page("/").body.find("0 of 1 cell are fine; act now: cell-7."), std::string::npos);
+  EXPECT_NE(page("/").body.find("Its cell is not fine; act now: cell-7."), std::string::npos);
   EXPECT_NE(page("/").body.find("submit a batch"), std::string::npos);
   server_.submit("cell-7", "b1", 1);
   server_.work();
   EXPECT_NE(page("/").body.find("Its cell is fine."), std::string::npos);
+}
+
+TEST_F(PagesTest, AModelAndItsLastCheckLeadToEachOtherAndSayTheSameDay) {
+  server_.submit("cell-7", "b1", 1);
+  server_.work();
+  test::SmallBatch few;
+  few.poses = 12;
+  few.seed = 5;
+  const auto job = test::demand(server_.trainer().check(
+      "cell-7", "", test::small_batch_csv(*test::small_cell("cell-7"), few), 1.0));
+  server_.work();
+  const std::string findings = fmt::format("/jobs/{}/findings", job);
+  const std::string model = page("/cells/cell-7/models/1").body, health = page(findings).body;
+  EXPECT_NE(model.find("<a href=\"" + findings + "\">Last check</a>"), std::string::npos);
+  EXPECT_TRUE(links_of(health).contains("/cells/cell-7/models/1")) << health;
+  const auto json = nlohmann::json::parse(page(findings + ".json").body);
+  const std::string due = json.value("due", "");
+  ASSERT_FALSE(due.empty()) << json.dump();
+  EXPECT_NE(model.find("check again by " + due), std::string::npos) << due;
+  EXPECT_NE(health.find(due), std::string::npos);
+  EXPECT_NE(page("/").body.find("next check by " + due), std::string::npos) << page("/").body;
 }
 
 TEST_F(PagesTest, EveryLinkLeadsToAPageAndEveryPageIsReached) {

@@ -15,13 +15,16 @@ TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
           "due": "2026-12-01"}, "unlike_twins": [{"sentence": "a2 is 0.3 mm longer"}],
           "lines_among_sisters": [{"differs": true, "sentence": "the zero of joint 4 is off"},
           {"differs": false, "sentence": "the zero of joint 5 is not"}]},
-          {"cell": "b", "version": null, "health": {"verdict": "changed"}, "unlike_twins": []},
+          {"cell": "b", "version": null, "health": {"verdict": "changed"}, "unlike_twins": [],
+           "need": {"urgency": "now", "sentence": "The robot has changed: <joint> 3.", "action": "measure it anew"}},
           {"cell": "c", "version": null, "health": null}], "types": [{"robot": "R", "robots": 3}]})");
   const std::string page = fleet_page(fleet, 1'763'942'400);
   for (const char* part :
        {"a&lt;b&gt;", "0123 (version 3)", "cannot tell", "2026-12-01", "a2 is 0.3 mm longer",
         "like its twins", "not checked yet", "no model in force", "R: 3 robots", "2025-11-24",
-        "3 robots: 1 changed, 1 not checked yet."})
+        "3 robots: 1 changed, 1 not checked yet.",
+        "<span class=\"badge bad\">act now</span>The robot has changed: &lt;joint&gt; 3. "
+        "<b>To do:</b> measure it anew"})
     EXPECT_TRUE(test::has(page, part)) << part << "\n" << page;
   EXPECT_TRUE(test::has(page, "the zero of joint 4 is off"));
   EXPECT_FALSE(test::has(page, "the zero of joint 5 is not"));
