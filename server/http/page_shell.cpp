@@ -23,6 +23,7 @@ constexpr std::string_view kStyle = R"(
   .wide { overflow-x: auto; }
   td { overflow-wrap: break-word; } time { white-space: nowrap; } .breaks { overflow-wrap: anywhere; }
   .now td { font-weight: 600; }
+  .dark td:first-child, .served td:first-child { min-width: 9ch; }
   .dark td:first-child { border-left: 4px solid var(--dark); padding-left: 8px; }
   .served td:first-child { border-left: 4px solid var(--good); padding-left: 8px; }
   @media print { nav { display: none; } td { min-width: 11ch; } .wide { overflow: visible; } }

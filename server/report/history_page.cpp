@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ctime>
 #include <map>
+#include <regex>
 
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
@@ -179,10 +180,16 @@ std::string training_table(const CellHistory& history) {
       {"trainings stacks", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
 }
 
+/// Hashes cut to the digits by which people tell models apart; the audit trail has them whole.
+std::string with_short_hashes(const std::string& text) {
+  static const std::regex kHash("\\b([0-9a-f]{12})[0-9a-f]{52}\\b");
+  return std::regex_replace(text, kHash, "$1…");
+}
+
 std::string from_to(const EventOnRecord& one) {
   if (one.before.empty() && one.after.empty()) return "";
-  return fmt::format("{} → {}", one.before.empty() ? "nothing" : one.before,
-                     one.after.empty() ? "nothing" : one.after);
+  return with_short_hashes(fmt::format("{} → {}", one.before.empty() ? "nothing" : one.before,
+                                       one.after.empty() ? "nothing" : one.after));
 }
 
 std::string event_table(const CellHistory& history) {

@@ -65,9 +65,10 @@ TEST(History, ThePageShowsTrainingsEventsAndNotesAndWhatComesFromOutsideIsHarmle
                                 "since session lt-02 (pose p1): lost zero in joint 3"}};
   history.trainings = {
       {1'700'000'000, "lt-01", "in_force", "better beyond chance", 0.5e-3, 0.02e-3}};
-  history.events = {{1'700'000'000, "activate", "version 1", "<script>alert(1)</script>", "cam-2",
-                     "version 3", "version <4>"},
-                    {1'700'000'001, "batch", "batch b", "", "cam-2", "", "accepted"}};
+  history.events = {
+      {1'700'000'000, "activate", "version 1", "<script>alert(1)</script>", "cam-2", "version 3",
+       "version <4>"},
+      {1'700'000'001, "batch", "batch b", "", "cam-2", "", "sha256 " + std::string(64, 'a')}};
   EXPECT_EQ(history_json(history)["versions"][0]["notes"][0]["code"], "changed_between_sessions");
   EXPECT_EQ(history_json(history)["events"][0]["from"], "version 3");
   EXPECT_EQ(history_json(history)["events"][0]["to"], "version <4>");
@@ -75,7 +76,7 @@ TEST(History, ThePageShowsTrainingsEventsAndNotesAndWhatComesFromOutsideIsHarmle
   for (const char* part :
        {"0.5000", "0.0200", "in force: better beyond chance", "lost zero in joint 3", "activate",
         "&lt;b&gt;cell&lt;/b&gt;", "&lt;script&gt;", "2023-11-14 22:13",
-        "version 3 → version &lt;4&gt;", "nothing → accepted"})
+        "version 3 → version &lt;4&gt;", "nothing → sha256 aaaaaaaaaaaa…<"})
     EXPECT_TRUE(test::has(page, part)) << part;
   EXPECT_FALSE(test::has(page, "<script>"));
 }
