@@ -330,6 +330,7 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   tell(LogLevel::kInfo, "stopping", fmt::format("stopping: {}", ::strsignal(ended_by)));
   tell_manager_stopping();
   http.set_phase(ServerPhase::kStopping);
+  (*store)->will_end();
   service.stop();
   trainer.stop();
   tell(LogLevel::kInfo, "stopped", "stopped");

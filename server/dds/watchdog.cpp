@@ -4,7 +4,6 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstring>
@@ -63,16 +62,11 @@ void Watchdog::watch(const std::stop_token& stop) {
   Mutex mutex;  // local: used only to wait for the next look
   Condition never;
   MutexLock lock(mutex);
-  Clock::time_point last = Clock::now();
   while (!stop.stop_requested()) {
     never.wait_for(lock, stop, kTick, [] { return false; });
-    const Clock::time_point now = Clock::now();
-    const auto passed = std::min<Clock::duration>(now - last, kTick) * given_.since_last();
-    const auto stopped =
-        stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(passed));
-    last = now;
+    const auto stopped = stillness_.look(lived_.since_last());
     still_ = stillness_.still_for(kLong);
-    looked_ = now.time_since_epoch();
+    looked_ = Clock::now().time_since_epoch();
     if (!stopped.empty() && !stop.stop_requested()) end_hung(stopped);
   }
 }

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/dds/processor_share.h"
+#include "server/base/lived_time.h"
 #include "server/dds/stillness.h"
 
 namespace trammel {
@@ -46,7 +46,7 @@ class Watchdog {
   std::atomic<std::uint64_t> still_{0};  // as Stillness::still_for()
   std::atomic<std::chrono::steady_clock::duration> looked_{
       std::chrono::steady_clock::now().time_since_epoch()};
-  ProcessorShare given_;
+  LivedTime lived_{kTick};
   std::jthread thread_;
 };
 

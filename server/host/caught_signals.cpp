@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/base/check.h"
+#include "server/base/lived_time.h"
 
 namespace trammel {
 
@@ -44,7 +45,9 @@ void mask(int how) {
 
 }  // namespace
 
-CaughtSignals::CaughtSignals(std::function<void()> hangs) : hangs_(std::move(hangs)) {
+CaughtSignals::CaughtSignals(std::function<void()> hangs,
+                             std::function<std::chrono::milliseconds()> lived)
+    : hangs_(std::move(hangs)), lived_(std::move(lived)) {
   std::array<int, 2> ends = {};
   TRAMMEL_CHECK(::pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) == 0);
   numbers_ = ends[0];
@@ -104,12 +107,13 @@ void CaughtSignals::note(int number) {
 
 void CaughtSignals::watch_the_end(const std::stop_token& over) const {
   pollfd readable{numbers_, POLLIN, 0};
-  // Counts ticks, not time: a process that was paused meanwhile does not hang.
-  for (auto waited = kTick; waited <= kOrderlyStop;) {
-    if (::poll(&readable, 1, static_cast<int>(kTick.count())) == 0) waited += kTick;
+  LivedTime measured(kTick);
+  for (std::chrono::milliseconds waited{0}; waited < kOrderlyStop;) {
+    ::poll(&readable, 1, static_cast<int>(kTick.count()));
     unsigned char ignored = kOver;  // further requests change nothing
     static_cast<void>(::read(numbers_, &ignored, 1));
     if (over.stop_requested()) return;
+    waited += lived_ ? lived_() : measured.since_last();
   }
   hangs_();
 }

@@ -17,9 +17,11 @@ namespace trammel {
 /// so that none of their calls is interrupted. At most one object exists at a time.
 class CaughtSignals {
  public:
-  /// `hangs` is called if the process still runs 10 s after a termination signal; it does not
-  /// return.
-  explicit CaughtSignals(std::function<void()> hangs);
+  /// `hangs` is called if the process still runs 10 s after a termination signal, of the time that
+  /// it lived through (LivedTime). It does not return. `lived` says that time since it was called
+  /// last; empty: it is measured.
+  explicit CaughtSignals(std::function<void()> hangs,
+                         std::function<std::chrono::milliseconds()> lived = {});
   ~CaughtSignals();
   CaughtSignals(const CaughtSignals&) = delete;
   CaughtSignals& operator=(const CaughtSignals&) = delete;
@@ -37,6 +39,7 @@ class CaughtSignals {
   void watch_the_end(const std::stop_token& over) const;
 
   std::function<void()> hangs_;
+  std::function<std::chrono::milliseconds()> lived_;
   int numbers_ = -1;  // the end of the pipe that is read
   Mutex mutex_;
   Condition came_;

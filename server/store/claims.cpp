@@ -113,6 +113,8 @@ void Store::wait_for_change(const std::stop_token& stop, std::chrono::millisecon
   connection_->wait_for_change(stop, limit);
 }
 
+void Store::will_end() { connection_->will_end(); }
+
 Result<ClaimState> Store::renew_claim(std::int64_t job) {
   return connection_->urgently([&](Database& database) -> Result<ClaimState> {
     const std::string renew = fmt::format(

@@ -55,6 +55,8 @@ class StoreConnection {
   /// Returns when another server may have changed something, after `limit` at the latest, or when
   /// `stop` is requested. For one thread.
   virtual void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) = 0;
+  /// See Store::will_end().
+  virtual void will_end() {}
 
   [[nodiscard]] StoreState state() const;
   /// Records the trouble, and wakes the threads that wait for a change of the state.

@@ -34,7 +34,8 @@ Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::strin
                                                                 const std::string& cache) {
   std::unique_ptr<SharedConnection> made(
       new SharedConnection(url, std::make_unique<ServedCopies>(cache)));
-  auto connected = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
+  auto connected =
+      PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites, made->patience_);
   const auto stores = made->copies->stores();
   if (connected) {
     TRY(made->admit(**connected));
@@ -74,7 +75,7 @@ Status SharedConnection::admit(Database& database) {
 }
 
 Result<SharedConnection::Connected> SharedConnection::connect() {
-  auto connected = PostgresDatabase::connect(url_, PostgresDatabase::Session::kWrites);
+  auto connected = PostgresDatabase::connect(url_, PostgresDatabase::Session::kWrites, patience_);
   if (!connected) return Failure(connected.error()).in(path);
   TRY(admit(**connected));
   return connected;

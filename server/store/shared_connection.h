@@ -22,6 +22,7 @@ class SharedConnection final : public StoreConnection {
   [[nodiscard]] bool is_shared() const override { return true; }
   [[nodiscard]] Status try_again() override;
   void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) override;
+  void will_end() override { patience_->ends(); }
 
  private:
   using Connected = std::unique_ptr<PostgresDatabase>;
@@ -47,6 +48,7 @@ class SharedConnection final : public StoreConnection {
   [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);
 
   const std::string url_;  // may hold a password
+  const std::shared_ptr<Patience> patience_ = std::make_shared<Patience>();
   Mutex mutex_;
   Condition given_back_;
   std::string identity_ TRAMMEL_GUARDED_BY(mutex_);  // of the store; empty: not known yet

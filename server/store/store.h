@@ -324,6 +324,9 @@ class Store {
   /// Returns when another server may have changed something, after `limit` at the latest, or when
   /// `stop` is requested. For one thread.
   void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit);
+  /// The service is to end: no call, and none under way, waits for the database of several servers
+  /// for longer than a few seconds from now.
+  void will_end();
   /// Refuses (kConflict) where another version of the cell is in force than the change expects.
   [[nodiscard]] Status check_expected(const std::string& cell, const ChangeId& change_id) const;
 

@@ -50,6 +50,8 @@ int measure(const std::vector<std::string>& faults, int rounds, int clients) {
   test::tell_figure("failover: changes acknowledged", static_cast<double>(load.acknowledged()));
   test::tell_figure("failover: acknowledged and lost", static_cast<double>(lost.size()));
   test::tell_figure("failover: made twice", fleet.twice().empty() ? 0 : 1);
+  test::tell_figure("failover: put in force on one server until another serves it, s",
+                    fleet.until_served_elsewhere_s());
   return 0;
 }
 

@@ -47,6 +47,7 @@ int measure(const test::KillPlan& plan, const std::string& history) {
   test::tell_figure("kills: jobs that three servers died of", outcome.given_up);
   test::tell_figure("kills: predictions while servers were killed", outcome.predictions);
   test::tell_figure("kills: predictions that failed", outcome.failed);
+  test::tell_figure("kills: servers that ended by themselves", outcome.ended_by_themselves);
   test::tell_figure("kills: audit trail broken", outcome.trail_whole ? 0 : 1);
   test::tell_figure("kills: cells served otherwise than is in force", outcome.served_otherwise);
   test::tell_figure("kills: p99 of a prediction in a quiet fleet, ms", outcome.p99_quiet_ms);

@@ -33,6 +33,7 @@ TEST(Failover, WhenTheHostOfThePrimaryIsKilledChangesGoOnAndNothingAcknowledgedI
   EXPECT_EQ(fleet.lost(load), std::set<std::string>())
       << "of " << load.acknowledged() << " that were acknowledged";
   EXPECT_EQ(fleet.twice(), "");
+  EXPECT_LT(fleet.until_served_elsewhere_s(), 2) << "all hear of the new primary's changes";
 }
 
 }  // namespace

@@ -298,6 +298,25 @@ TEST_F(FleetOfDyingServers, AChangeThatIsCommittedAndNotAnsweredIsToldByAnotherS
   EXPECT_EQ(counted(fmt::format("job_batches WHERE batch = 'b3' AND job = {}", *taken)), "1\n");
 }
 
+TEST_F(FleetOfDyingServers, ADatabaseThatIsStoppedAndNotDeadKeepsNoServerFromEnding) {
+  EXPECT_EQ(second_.stop(), 0);
+  held_.hold("INSERT INTO batches");
+  auto asked = std::async(std::launch::async, [&] {
+    return session_with({&first_}, seconds(20))
+        ->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3));
+  });
+  EXPECT_EQ(held_.held(kFleetLimit), first_.process().pid());
+  database_.freeze(true);
+  EXPECT_EQ(first_.stop(), 0) << first_.process().standard_error();
+  EXPECT_FALSE(asked.get()) << "nobody knows whether it was made";
+  database_.freeze(false);
+  first_.start();
+  const auto known =
+      session_with({&first_})->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3));
+  EXPECT_TRUE(known) << sentence(known.error());
+  EXPECT_EQ(counted("batches WHERE id = 'b3'"), "1\n");
+}
+
 TEST_F(Fleet, WhenAServerIsKilledTheOtherAnswersAtOnceAndWithTheSameModel) {
   start(first_);
   start(second_);

@@ -23,6 +23,7 @@ TEST(KilledFleet, LosesNothingMakesNothingTwiceAndGoesOn) {
   EXPECT_GT(outcome.predictions, 0);
   EXPECT_EQ(outcome.failed, 0);
   EXPECT_EQ(outcome.served_otherwise, 0) << "what is in force is served by all in the end";
+  EXPECT_EQ(outcome.ended_by_themselves, 0) << "a server that waits for a processor does not hang";
   EXPECT_TRUE(outcome.trail_whole);
 }
 

@@ -37,6 +37,12 @@ std::string start_check(const std::string& server_file) {
   return command;
 }
 
+TEST(Unit, WaitsForNoDatabaseNeitherOfItsHostNorOfAnother) {
+  const std::string unit = test::read_file(TRAMMEL_SOURCE_DIR "/deploy/trammeld.service");
+  EXPECT_FALSE(std::regex_search(unit, std::regex("postgres|patroni|network-online")))
+      << "a server that starts while the record is away serves what it saw last";
+}
+
 TEST(Unit, AMisspeltKeyEndsTheStartAtOnceWithItsLine) {
   const test::TemporaryFolder folder;
   const std::string start = "version: 1\nserver: checked\ncells: [" TRAMMEL_SOURCE_DIR

@@ -1,5 +1,6 @@
 #include "tests/support/failing_over.h"
 
+#include <chrono>
 #include <sstream>
 
 #include "server/base/text_file.h"
@@ -67,6 +68,23 @@ std::string FailingOver::twice() const {
   const AuditTrail trail = demand(read_audit(url, {}));
   if (trail.broken) found += sentence(*trail.broken);
   return found;
+}
+
+double FailingOver::until_served_elsewhere_s() const {
+  const auto one = demand(client::Session::open(first->session_options()));
+  const auto other = demand(client::Session::open(second->session_options()));
+  client::CallContext context;
+  context.cell = "cell-7";
+  client::ChangeOptions forced;
+  forced.force = true;
+  const auto served = [&] {
+    return demand(other->predict_error(context, virtual_joints(1, 7))).model.version;
+  };
+  const int version = demand(one->activate("cell-7", served() == 1 ? 2 : 1, forced));
+  const auto begin = std::chrono::steady_clock::now();
+  std::chrono::duration<double> passed{0};
+  while (served() != version && passed < kLimit) passed = std::chrono::steady_clock::now() - begin;
+  return passed.count();
 }
 
 }  // namespace trammel::test

@@ -24,6 +24,10 @@ class FailingOver {
   /// Changes and jobs that occur twice, and faults of the trail; empty: none.
   [[nodiscard]] std::string twice() const;
 
+  /// From a version that is put in force on the first server until the second one serves it, s;
+  /// meanwhile nobody else changes anything.
+  [[nodiscard]] double until_served_elsewhere_s() const;
+
   Patroni record;
   std::string url;
   std::unique_ptr<Daemon> first, second;

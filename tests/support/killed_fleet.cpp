@@ -34,6 +34,7 @@ constexpr milliseconds kPredictionPatience{5000};
 constexpr milliseconds kBetweenPredictions{20};
 constexpr milliseconds kKnownAgain{2000};  // a server that is back, before the other one's turn
 constexpr std::int64_t kMillisecondUs = 1000;
+constexpr std::size_t kLastWords = 600;  // of a server that ended by itself
 
 const std::vector<std::string> kSmallCells = {"small-1", "small-2"};
 
@@ -139,12 +140,27 @@ class Fleet {
     int done = 0;
     for (std::int64_t next = 0; done < kills; pass(milliseconds(10))) {
       bring_back(false);
+      start_again();
       if (monotonic_us() < next) continue;
       if (!strike()) continue;
       ++done;
       next = monotonic_us() + after(milliseconds(100), longest_pause);
     }
     bring_back(true);
+  }
+  /// Servers that ended though nobody killed them; they are started again.
+  int start_again() {
+    for (std::size_t i = 0; i < servers_.size(); ++i) {
+      if (away_[i]) continue;
+      const auto code = servers_[i].process().wait(milliseconds(0));
+      if (!code) continue;
+      ++ended_by_themselves_;
+      const std::string said = servers_[i].process().standard_error();
+      fmt::print(stderr, "server {} ended with code {}: {}\n", i, *code,
+                 said.substr(said.size() - std::min(said.size(), kLastWords)));
+      servers_[i].start();
+    }
+    return ended_by_themselves_;
   }
   [[nodiscard]] const std::vector<Loss>& losses() const { return losses_; }
   [[nodiscard]] const std::vector<AskedCell>& cells() const { return cells_; }
@@ -274,6 +290,7 @@ class Fleet {
   std::array<std::optional<Away>, 3> away_;
   std::array<std::int64_t, 3> known_at_{};  // when clients know a server again that was away
   std::vector<Loss> losses_;
+  int ended_by_themselves_ = 0;
 };
 
 /// When changes were acknowledged, from the history. In order.
@@ -496,6 +513,7 @@ void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history,
   outcome.given_up =
       static_cast<int>(fleet.rows("SELECT 1 FROM job_outcomes WHERE verdict = 'broken'").size());
   outcome.served_otherwise = served_otherwise(fleet);
+  outcome.ended_by_themselves = fleet.start_again();
   outcome.trail_whole =
       run({TRAMMEL_BINARY_DIR "/clients/trammel", "audit", "--store", fleet.url()}).exit_code == 0;
 }

@@ -66,7 +66,10 @@ Postgres& Postgres::of_program() {
   return one;
 }
 
-Postgres::Postgres(Disk disk) : disk_(disk) {
+Postgres::Postgres(Disk disk)
+    : folder_(disk == Disk::kOwn ? TemporaryFolder::Place::kInMemory
+                                 : TemporaryFolder::Place::kDisk),
+      disk_(disk) {
   give_to_its_user(folder_.path());
   const Finished made = run(as_its_user({program("initdb"), "-D", data(), "-U", "postgres", "-A",
                                          "trust", "-E", "UTF8", "--locale=C.UTF-8", "--no-sync"}),

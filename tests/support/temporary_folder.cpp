@@ -2,16 +2,35 @@
 
 #include <stdlib.h>
 
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <string>
 #include <system_error>
 
 #include "server/base/check.h"
 
 namespace trammel::test {
 
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "trammel-XXXXXX").string();
+namespace {
+
+constexpr std::uintmax_t kRoom = std::uintmax_t{4} << 30;
+
+std::filesystem::path folder_above(TemporaryFolder::Place place) {
+  const std::filesystem::path memory = "/dev/shm";
+  std::error_code none;
+  const auto space = std::filesystem::space(memory, none);
+  const bool fits = !none && space.available >= kRoom;
+  return place == TemporaryFolder::Place::kInMemory && fits
+             ? memory
+             : std::filesystem::temp_directory_path();
+}
+
+}  // namespace
+
+TemporaryFolder::TemporaryFolder(Place place) {
+  std::string name = (folder_above(place) / "trammel-XXXXXX").string();
   TRAMMEL_CHECK(::mkdtemp(name.data()) != nullptr);
   path_ = name;
 }

@@ -8,7 +8,10 @@ namespace trammel::test {
 /// A new empty folder, removed with its contents at the end.
 class TemporaryFolder {
  public:
-  TemporaryFolder();
+  /// kInMemory: where the host has room in a file system of its memory, for many files that need
+  /// not outlive the test. On a disk each of them is discarded as it is removed, one by one.
+  enum class Place { kDisk, kInMemory };
+  explicit TemporaryFolder(Place place = Place::kDisk);
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;

@@ -22,6 +22,7 @@ constexpr milliseconds kPerHost{1000};  // for one connection attempt
 constexpr milliseconds kAnswer{6000};   // longer than the server's own limit below
 constexpr milliseconds kCommit{10000};  // which may include waiting for a standby
 constexpr milliseconds kLongWork{600000};
+constexpr milliseconds kSlice{250};    // until a call hears that it may wait no longer
 constexpr int kOldestServer = 130000;  // gen_random_uuid()
 constexpr const char* kLimits =
     "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '1s'; SET LOCAL "
@@ -149,26 +150,29 @@ class Bound {
   std::vector<int> lengths_, formats_;
 };
 
-/// True if the socket is ready by the deadline.
-bool is_ready(int socket, short events, std::chrono::steady_clock::time_point deadline) {
+/// True if the socket is ready by the deadline, and before the patience ends.
+bool is_ready(int socket, short events, std::chrono::steady_clock::time_point deadline,
+              const Patience& patience) {
   pollfd one{socket, events, 0};
   for (;;) {
-    const auto left = std::chrono::ceil<milliseconds>(deadline - std::chrono::steady_clock::now());
-    const int ready = left.count() <= 0 ? 0 : ::poll(&one, 1, static_cast<int>(left.count()));
-    if (ready < 0 && errno == EINTR) continue;
-    return ready > 0;
+    const auto left = std::chrono::ceil<milliseconds>(patience.limited(deadline) -
+                                                      std::chrono::steady_clock::now());
+    if (left.count() <= 0) return false;
+    const int ready = ::poll(&one, 1, static_cast<int>(std::min(left, kSlice).count()));
+    if (ready > 0) return true;
+    if (ready < 0 && errno != EINTR) return false;
   }
 }
 
 /// Takes the steps of connecting; empty: it is connected. libpq knows no deadline here.
-std::string why_not_connected(PGconn* connection) {
+std::string why_not_connected(PGconn* connection, const Patience& patience) {
   const auto deadline = std::chrono::steady_clock::now() + kPerHost;
   for (auto state = PGRES_POLLING_WRITING; state != PGRES_POLLING_OK;
        state = ::PQconnectPoll(connection)) {
     if (state == PGRES_POLLING_FAILED || ::PQstatus(connection) == CONNECTION_BAD)
       return first_line(::PQerrorMessage(connection));
     if (!is_ready(::PQsocket(connection), state == PGRES_POLLING_READING ? POLLIN : POLLOUT,
-                  deadline))
+                  deadline, patience))
       return fmt::format("{} did not answer within {} ms", ::PQhost(connection), kPerHost.count());
   }
   return "";
@@ -213,13 +217,15 @@ bool is_read_only(PGconn* connection, Database& database) {
 
 }  // namespace
 
-PostgresDatabase::PostgresDatabase(Connection connection) : connection_(std::move(connection)) {
+PostgresDatabase::PostgresDatabase(Connection connection, std::shared_ptr<const Patience> patience)
+    : connection_(std::move(connection)), patience_(std::move(patience)) {
   ::PQsetNoticeReceiver(connection_.get(), &PostgresDatabase::note_warning, this);
   ::PQsetnonblocking(connection_.get(), 1);
 }
 
 Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(
-    const PostgresSettings& settings, Session session) {
+    const PostgresSettings& settings, Session session,
+    const std::shared_ptr<const Patience>& patience) {
   std::vector<const char*> keys, values;
   for (const auto& [key, value] : settings) {
     keys.push_back(key.c_str());
@@ -229,7 +235,7 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(
   values.push_back(nullptr);
   Connection connection(::PQconnectStartParams(keys.data(), values.data(), 0), &::PQfinish);
   if (!connection) return failure(ErrorCode::kInternal, "no memory for a connection");
-  if (const std::string why = why_not_connected(connection.get()); !why.empty()) {
+  if (const std::string why = why_not_connected(connection.get(), *patience); !why.empty()) {
     const bool for_good = is_refused_for_good(connection.get(), why);
     return failure(for_good ? ErrorCode::kRefused : ErrorCode::kUnreachable, "{}", why)
         .next(for_good ? "mend the URL, or what the database allows"
@@ -238,7 +244,7 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(
   if (const int version = ::PQserverVersion(connection.get()); version < kOldestServer)
     return refused("PostgreSQL {} is too old, limit {}", version / 10000, kOldestServer / 10000)
         .beyond(version / 10000, kOldestServer / 10000);
-  std::unique_ptr<PostgresDatabase> made(new PostgresDatabase(std::move(connection)));
+  std::unique_ptr<PostgresDatabase> made(new PostgresDatabase(std::move(connection), patience));
   try {
     if (session == Session::kWrites && is_read_only(made->connection_.get(), *made))
       return failure(ErrorCode::kUnreachable, "{} is a read-only standby",
@@ -250,8 +256,8 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(
   return made;
 }
 
-Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::string& url,
-                                                                    Session session) {
+Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(
+    const std::string& url, Session session, std::shared_ptr<const Patience> patience) {
   auto hosts = TRY(settings_of(url));
   std::shuffle(hosts.begin(), hosts.end(), std::mt19937_64(std::random_device{}()));
   std::optional<Error> why;
@@ -259,13 +265,17 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::s
     if (!why || error.code == ErrorCode::kRefused) why = error;
   };
   for (const PostgresSettings& host : hosts) {
+    if (patience->is_over()) {
+      keep(failure(ErrorCode::kUnreachable, "the service ends").value());
+      break;
+    }
     const auto places = with_addresses(host, kPerHost);
     if (!places) {
       keep(places.error());
       continue;
     }
     for (const PostgresSettings& place : *places) {
-      auto made = connect_to_one(place, session);
+      auto made = connect_to_one(place, session, patience);
       if (made) return made;
       keep(made.error());
     }
@@ -289,7 +299,7 @@ void PostgresDatabase::check_sent(int sent) {
 }
 
 void PostgresDatabase::wait(short events, Deadline deadline) {
-  if (!is_ready(::PQsocket(connection_.get()), events, deadline))
+  if (!is_ready(::PQsocket(connection_.get()), events, deadline, *patience_))
     lose("the database does not answer");
 }
 
@@ -346,7 +356,8 @@ void PostgresDatabase::take_long() {
 
 bool PostgresDatabase::hears(milliseconds limit) {
   if (lost_) lose("");
-  if (is_ready(::PQsocket(connection_.get()), POLLIN, std::chrono::steady_clock::now() + limit))
+  if (is_ready(::PQsocket(connection_.get()), POLLIN, std::chrono::steady_clock::now() + limit,
+               *patience_))
     check_sent(::PQconsumeInput(connection_.get()));
   return take_words();
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/store/database/database.h"
+#include "server/store/database/patience.h"
 
 namespace trammel {
 
@@ -20,8 +21,9 @@ class PostgresDatabase final : public Database {
   /// Tries the hosts of the URL one after the other, in random order. Refuses (kUnreachable) if
   /// none answers. Refuses (kRefused) if one rejects the login, or if all that answer are read-only
   /// although `session` must write.
-  [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(const std::string& url,
-                                                                         Session session);
+  [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(
+      const std::string& url, Session session,
+      std::shared_ptr<const Patience> patience = std::make_shared<Patience>());
 
   using Database::change;
   using Database::run;
@@ -44,9 +46,10 @@ class PostgresDatabase final : public Database {
   using Answer = std::unique_ptr<PGresult, void (*)(PGresult*)>;
   using Deadline = std::chrono::steady_clock::time_point;
 
-  explicit PostgresDatabase(Connection connection);
+  PostgresDatabase(Connection connection, std::shared_ptr<const Patience> patience);
   [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect_to_one(
-      const std::vector<std::pair<std::string, std::string>>& settings, Session session);
+      const std::vector<std::pair<std::string, std::string>>& settings, Session session,
+      const std::shared_ptr<const Patience>& patience);
   static void note_warning(void* self, const PGresult* warning);
 
   void begin(bool writes) override;
@@ -64,6 +67,7 @@ class PostgresDatabase final : public Database {
   void check_sent(int sent);
 
   Connection connection_;
+  std::shared_ptr<const Patience> patience_;
   bool lost_ = false;
   bool warned_ = false;      // a warning came: during a commit, that no standby has confirmed it
   bool takes_long_ = false;  // of the open transaction
