@@ -83,7 +83,10 @@ double FailingOver::until_served_elsewhere_s() const {
   const int version = demand(one->activate("cell-7", served() == 1 ? 2 : 1, forced));
   const auto begin = std::chrono::steady_clock::now();
   std::chrono::duration<double> passed{0};
-  while (served() != version && passed < kLimit) passed = std::chrono::steady_clock::now() - begin;
+  for (bool is_served = false; !is_served && passed < kLimit;) {
+    is_served = served() == version;
+    passed = std::chrono::steady_clock::now() - begin;
+  }
   return passed.count();
 }
 
