@@ -274,6 +274,14 @@ void tell_in_force(const ServedModel& model) {
        {{"cell", model.cell}, {"version", std::to_string(model.version)}, {"model", id}});
 }
 
+void stop(Store& store, DdsService& service, Trainer& trainer) {
+  tell_manager_stopping();
+  store.will_end();
+  service.stop();
+  trainer.stop();
+  tell(LogLevel::kInfo, "stopped", "stopped");
+}
+
 /// Serves until a signal ends it.
 Status serve(ServerConfig config, const Arguments& arguments) {
   CaughtSignals signals(hangs);  // before any thread of ours starts
@@ -328,12 +336,8 @@ Status serve(ServerConfig config, const Arguments& arguments) {
 
   const int ended_by = watch(signals, {config, arguments, service, trainer, registry});
   tell(LogLevel::kInfo, "stopping", fmt::format("stopping: {}", ::strsignal(ended_by)));
-  tell_manager_stopping();
   http.set_phase(ServerPhase::kStopping);
-  (*store)->will_end();
-  service.stop();
-  trainer.stop();
-  tell(LogLevel::kInfo, "stopped", "stopped");
+  stop(**store, service, trainer);
   return {};
 }
 

@@ -44,7 +44,7 @@ struct KilledFleetOutcome {
   /// Since then: how long jobs of a cell waited that nobody worked for, the longest time and the
   /// sum, of the worst cell.
   double longest_idle_s = 0, idle_s = 0;
-  int served_otherwise = 0;  ///< servers that at the end do not serve the version in force
+  int served_otherwise = 0;     ///< servers that at the end do not serve the version in force
   int ended_by_themselves = 0;  ///< servers that ended though nobody killed them
   bool trail_whole = false;
 };
