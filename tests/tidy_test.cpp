@@ -47,7 +47,7 @@ const std::map<std::string, Outsider> kOutsiders = {
     {"clients/cam", {{}, 2}},
     {"clients/programs", {{"clients/cam"}, 7}},
     {"clients/cli", {{"clients/session", "clients/cam", "clients/programs"}, 7}},
-    {"clients/library", {{"clients/session"}, 7}},
+    {"clients/library", {{"clients/session", "clients/cam", "clients/programs"}, 7}},
     {"clients/python", {{}, -1}},
     {"clients", {{"clients/cli"}, -1}},
     {"idl", {{}, 0}},

@@ -530,12 +530,6 @@ void add_model_answers(py::class_<api::Model>& type) {
 
 void add_work(py::module_& m) {
   m.def(
-      "history",
-      [](const std::vector<api::Model>& models) {
-        return value_or_raise(unlocked([&] { return api::history(models); }));
-      },
-      "models"_a);
-  m.def(
       "train",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches,
          std::optional<std::string> level, std::optional<std::string> bias, std::uint64_t seed,
@@ -819,6 +813,12 @@ PYBIND11_MODULE(_trammel, m) {
   add_model_work(model);
   add_model_answers(model);
   add_work(m);
+  m.def(
+      "history",
+      [](const std::vector<api::Model>& models) {
+        return value_or_raise(unlocked([&] { return api::history(models); }));
+      },
+      "models"_a);
   m.attr("version") = TRAMMEL_VERSION;
   py::class_<Session> session(m, "Session");
   add_session_state(session);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/compensate/model_notes.h"
-#include "server/health/health_verdict.h"
+#include "server/health/health_check.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 

@@ -72,6 +72,7 @@ trammel report --model second.model --batch fresh.csv -o model-and-batch.html
 trammel check --model cell.model --batch few.csv --report health.html
 trammel history --model cell.model --model second.model -o history.html
 trammel fleet --model cell.model --model second.model --report fleet.html
+trammel view --cell cell.yaml plan.csv -o view.html
 trammel correct --model cell.model "$PROGRAM" -o corrected.mod --tolerance 0.2 --report program.html
 )";
 
@@ -168,7 +169,7 @@ class PagesOfFiles : public Screenshots {
 TEST_F(PagesOfFiles, AreWholeAtEverySizeDatedAndLinkedToEachOther) {
   std::map<std::string, std::set<std::string>> links;
   for (const char* page :
-       {"diagnosis", "model", "model-and-batch", "health", "history", "fleet", "program"}) {
+       {"diagnosis", "model", "model-and-batch", "health", "history", "fleet", "program", "view"}) {
     const std::string file = folder_.file(std::string(page) + ".html");
     links[page] = look_at({"file://" + file, page, fs::file_size(file)});
     for (const std::string& link : links[page]) {
@@ -176,7 +177,8 @@ TEST_F(PagesOfFiles, AreWholeAtEverySizeDatedAndLinkedToEachOther) {
       EXPECT_TRUE(fs::exists(folder_.path() / link.substr(2))) << page << ": " << link;
     }
   }
-  EXPECT_TRUE(links["model"].contains("./diagnosis.html"));
+  for (const char* beside : {"./diagnosis.html", "./health.html", "./view.html", "./program.html"})
+    EXPECT_TRUE(links["model"].contains(beside)) << "written later: " << beside;
   for (const char* beside :
        {"./model.html", "./diagnosis.html", "./health.html", "./history.html", "./fleet.html"})
     EXPECT_TRUE(links["program"].contains(beside)) << beside;

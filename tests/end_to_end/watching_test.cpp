@@ -91,7 +91,7 @@ TEST_F(WatchingTest, MetricsReadinessAndPagesFollowACellFromItsFirstBatchOn) {
   EXPECT_EQ(metric("trammel_jobs_ended_total{verdict=\"in_force\"}"), 1);
   EXPECT_EQ(metric("trammel_cell_ready{cell=\"cell-7\",state=\"served\"}"), 1);
   EXPECT_GT(metric("trammel_store_bytes"), 10000);
-  EXPECT_NE(get("/").body.find("Its cell is answered for"), std::string::npos);
+  EXPECT_NE(get("/").body.find("its check by"), std::string::npos) << get("/").body;
   EXPECT_NE(get("/cells/cell-7/models/1").body.find("lt-07"), std::string::npos);
   EXPECT_EQ(get("/nothing").code, 404);
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();

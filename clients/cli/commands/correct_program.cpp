@@ -148,7 +148,7 @@ Status write_texts(const Texts& texts, const std::vector<std::string>& programs)
   std::vector<TextFile> files;
   std::copy_if(texts.begin(), texts.end(), std::back_inserter(files),
                [](const TextFile& text) { return text.path != "-"; });
-  TRY(write_text_files(files));
+  TRY(write_files(files));
   for (const TextFile& text : texts) {
     if (text.path != "-") continue;
     TRY(write_output("-", text.text));

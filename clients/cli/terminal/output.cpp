@@ -54,12 +54,14 @@ bool& standard_output_is_taken() {
 
 }  // namespace
 
+Status write_files(const std::vector<TextFile>& files) {
+  TRY(write_text_files(files));
+  for (const TextFile& file : files) link_pages_beside(file.text, file.path);
+  return {};
+}
+
 Status write_output(const std::string& path, const std::string& text) {
-  if (path != "-") {
-    TRY(write_text_file(path, text));
-    link_pages_beside(text, path);
-    return {};
-  }
+  if (path != "-") return write_files({{path, text}});
   standard_output_is_taken() = true;
   const bool written =
       std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
@@ -134,8 +136,7 @@ Status Outputs::write() const {
   for (const Output& output : outputs_) {
     if (output.text && output.file.path != "-") files.push_back({output.file.path, *output.text});
   }
-  TRY(write_text_files(files));
-  for (const TextFile& file : files) link_pages_beside(file.text, file.path);
+  TRY(write_files(files));
   for (const Output& output : outputs_) {
     if (output.text && output.file.path == "-") return write_output("-", *output.text);
   }

@@ -7,12 +7,16 @@
 #include <vector>
 
 #include "server/base/result.h"
+#include "server/base/text_file.h"
 #include "server/report/error_json.h"
 
 namespace trammel::cli {
 
 /// Writes `text` whole or not at all; `-` is standard output.
 [[nodiscard]] Status write_output(const std::string& path, const std::string& text);
+
+/// write_text_files(); pages among them are linked with those beside them, both ways.
+[[nodiscard]] Status write_files(const std::vector<TextFile>& files);
 
 /// Writes `value` to the path of --json; does nothing for an empty path.
 [[nodiscard]] Status write_json(const std::string& path, const nlohmann::ordered_json& value);
