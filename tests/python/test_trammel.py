@@ -826,7 +826,8 @@ class Guards(unittest.TestCase):
         told = json.loads((self.folder / "m.json").read_text())
         self.assertEqual(drawn.notes, told["notes"])
         values = [parameter["value"] for parameter in drawn.parameters]
-        np.testing.assert_allclose(values, [parameter["value"] for parameter in told["parameters"]], rtol=1e-9, atol=1e-12)
+        trained = trammel.Model.load(self.folder / "m.model")
+        np.testing.assert_allclose(values, [parameter["value"] for parameter in trained.parameters], rtol=1e-9, atol=1e-12)
         self.assertNotEqual(values, [parameter["value"] for parameter in alone.parameters])
 
     def test_what_a_diagnosis_tells_is_the_same_at_every_door(self):

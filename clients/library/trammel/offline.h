@@ -166,9 +166,10 @@ struct ProgramFile {
 
 /// The options of the correction of a program.
 struct ProgramOptions {
-  std::string format;         ///< the dialect; empty: by the endings
-  std::string tool, payload;  ///< of the cell; empty: as the program says, or the only ones
-  bool keep_digits = false;   ///< numbers keep their decimals, whatever rounding costs
+  std::string format;        ///< the dialect; empty: by the endings
+  std::string tool;          ///< of the cell; empty: as the program says, or the only one
+  std::string payload;       ///< of the cell; empty: as the program says, or the only one
+  bool keep_digits = false;  ///< numbers keep their decimals, whatever rounding costs
 };
 
 /// A corrected program.
