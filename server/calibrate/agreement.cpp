@@ -7,7 +7,6 @@
 
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
-#include "server/calibrate/identify/together.h"
 #include "server/calibrate/identify/weighting.h"
 #include "server/calibrate/sessions/session_setting.h"
 #include "server/error_sources/catalogue.h"
@@ -67,12 +66,8 @@ double stated_sigma(const MeasurementBatch& batch, const Cell& cell) {
 class RowSearch {
  public:
   RowSearch(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-            const MeasurementBatch& batch, const std::function<Status()>& go_on)
-      : cell_(cell),
-        sources_(sources),
-        batch_(batch),
-        go_on_(go_on),
-        sigma_(stated_sigma(batch, *cell)) {}
+            const MeasurementBatch& batch)
+      : cell_(cell), sources_(sources), batch_(batch), sigma_(stated_sigma(batch, *cell)) {}
 
   /// The rows that agree; all rows where the search cannot separate bad ones.
   [[nodiscard]] Rows agreeing(const Result<CalibrationResult>& plain) const {
@@ -91,8 +86,7 @@ class RowSearch {
     if (!found) return led_to_by_frames(few);
     const std::optional<Readmitted> settled =
         left(*found) > kMuchLess * before ? std::nullopt : readmitted(std::move(*found), sources_);
-    if (settled && left(settled->found) <= kMuchLess * before)
-      return enough(with_those_together(*settled));
+    if (settled && left(settled->found) <= kMuchLess * before) return enough(settled->rows);
     return has_gauges(batch_) ? led_to_by_frames(few) : all;
   }
 
@@ -103,9 +97,7 @@ class RowSearch {
 
   [[nodiscard]] std::optional<CalibrationResult> fitted(const std::vector<std::string>& sources,
                                                         const MeasurementBatch& rows) const {
-    CalibrateOptions options;
-    options.go_on = go_on_;
-    Result<CalibrationResult> found = calibrate(cell_, sources, rows, options);
+    Result<CalibrationResult> found = calibrate(cell_, sources, rows, {});
     return found ? std::optional(std::move(*found)) : std::nullopt;
   }
 
@@ -234,20 +226,6 @@ class RowSearch {
     return settled ? enough(settled->rows) : all_rows(batch_.measurements.size());
   }
 
-  /// The rows that agree, and those that are no mistakes, since their neighbours in joint space are
-  /// off as well.
-  [[nodiscard]] Rows with_those_together(const Readmitted& settled) const {
-    const Rows all = all_rows(batch_.measurements.size());
-    Rows others, rows;
-    std::set_difference(all.begin(), all.end(), settled.rows.begin(), settled.rows.end(),
-                        std::back_inserter(others));
-    const Rows together =
-        together_in_joints(cell_->robot, batch_, farness(settled.found, batch_), others);
-    std::set_union(settled.rows.begin(), settled.rows.end(), together.begin(), together.end(),
-                   std::back_inserter(rows));
-    return rows;
-  }
-
   /// `rows`, or all rows if these are too few to be right.
   [[nodiscard]] Rows enough(Rows rows) const {
     Rows all = all_rows(batch_.measurements.size());
@@ -258,7 +236,6 @@ class RowSearch {
   const std::shared_ptr<const Cell>& cell_;
   const std::vector<std::string>& sources_;
   const MeasurementBatch& batch_;
-  const std::function<Status()>& go_on_;
   const double sigma_;
 };
 
@@ -272,8 +249,7 @@ std::shared_ptr<const Cell> anywhere(const Cell& cell) {
 /// The agreeing rows of each session, with the instrument placed by that session alone and the arm
 /// as it was then.
 Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell,
-                          const std::vector<std::string>& sources, const MeasurementBatch& batch,
-                          const std::function<Status()>& go_on) {
+                          const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   const std::shared_ptr<const Cell> placed = anywhere(*cell);
   const std::vector<MeasurementBatch> sessions = by_session(batch);
   std::vector<Rows> rows_of(sessions.size());
@@ -283,7 +259,7 @@ Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell,
   for (std::size_t s = 0; s < sessions.size(); ++s) {
     if (rows_of[s].empty()) continue;
     const auto alone = calibrate(placed, sources, sessions[s], {});
-    for (const std::size_t row : RowSearch(placed, sources, sessions[s], go_on).agreeing(alone))
+    for (const std::size_t row : RowSearch(placed, sources, sessions[s]).agreeing(alone))
       all.push_back(rows_of[s][row]);
   }
   std::sort(all.begin(), all.end());
@@ -298,13 +274,12 @@ double most_left(const CalibrationResult& found) {
 }
 
 Rows agreeing_rows(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-                   const MeasurementBatch& batch, const Result<CalibrationResult>& plain,
-                   const std::function<Status()>& go_on) {
-  if (!has_sessions(batch)) return RowSearch(cell, sources, batch, go_on).agreeing(plain);
+                   const MeasurementBatch& batch, const Result<CalibrationResult>& plain) {
+  if (!has_sessions(batch)) return RowSearch(cell, sources, batch).agreeing(plain);
   const double sigma = stated_sigma(batch, *cell);
   if (plain && std::hypot(sigma, most_left(*plain)) < kAsked * sigma)
     return all_rows(batch.measurements.size());
-  return agreeing_in_sessions(cell, sources, batch, go_on);
+  return agreeing_in_sessions(cell, sources, batch);
 }
 
 }  // namespace
@@ -312,10 +287,9 @@ Rows agreeing_rows(const std::shared_ptr<const Cell>& cell, const std::vector<st
 std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell,
                                       const std::vector<std::string>& sources,
                                       const MeasurementBatch& batch,
-                                      const Result<CalibrationResult>& plain,
-                                      const std::function<Status()>& go_on) {
+                                      const Result<CalibrationResult>& plain) {
   if (batch.measurements.empty()) return std::nullopt;
-  const Rows rows = agreeing_rows(cell, sources, batch, plain, go_on);
+  const Rows rows = agreeing_rows(cell, sources, batch, plain);
   if (rows.size() == batch.measurements.size()) return std::nullopt;
   Rows others;
   const Rows all = all_rows(batch.measurements.size());
@@ -323,60 +297,11 @@ std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell,
   return Agreement{only(batch, rows), only(batch, others)};
 }
 
-bool is_bad_row(double distance, double sigma) { return is_far_off(distance, sigma); }
-
-bool are_too_many_bad(std::size_t bad, std::size_t rows) {
-  return static_cast<double>(bad) > (1 - kAgreeing) * static_cast<double>(rows);
-}
-
-std::vector<SuspectPose> take_out_bad_rows(MeasurementBatch& held_out, const PhysicalModel& physics,
-                                           double discrepancy) {
-  if (held_out.measurements.empty()) return {};
-  const Residuals r = residuals_of(physics, held_out, physics.values);
-  const Weights weights{discrepancy, 0, true};
-  std::vector<SuspectPose> bad = suspects_of(held_out, r, weights);
-  mark_together(physics.cell->robot, held_out, farness_of(held_out, r, weights), bad);
-  std::erase_if(bad, [](const SuspectPose& one) { return one.together; });
-  if (are_too_many_bad(bad.size(), held_out.measurements.size())) return {};
-  std::erase_if(held_out.measurements, [&](const Measurement& m) {
-    return std::any_of(bad.begin(), bad.end(),
-                       [&](const SuspectPose& one) { return one.row == m.row; });
-  });
-  return bad;
-}
-
-namespace {
-
-/// `here` are rows in the world of `found`.
-bool are_off_alike(const CalibrationResult& found, const MeasurementBatch& here) {
-  constexpr double kAlike = 0.5;  // of their rms: the mean of rows that err by themselves is less
-  constexpr double kBeyondChance = 2;  // times the mean of so many random directions
-  constexpr double kFewest = 8;
-  Vector3 mean_W = Vector3::Zero(), mean_T = Vector3::Zero();
-  double square = 0, n = 0;
-  for (const Measurement& m : here.measurements) {
-    if (m.gauge) continue;
-    const Pose X_WT = found.model.pose_W(m.context, found.model.values, nullptr);
-    const Vector3 off = m.p_W - X_WT.translation();
-    mean_W += off;
-    mean_T += X_WT.linear().transpose() * off;
-    square += off.squaredNorm();
-    ++n;
-  }
-  if (n < kFewest) return false;
-  return std::max(mean_W.norm(), mean_T.norm()) / n >
-         std::max(kAlike, kBeyondChance / std::sqrt(n)) * std::sqrt(square / n);
-}
-
-}  // namespace
-
 void add_suspects(const MeasurementBatch& others, CalibrationResult& found) {
   const MeasurementBatch here = aligned(others, found.sessions, found.model.cell->tracker);
   const Residuals r = residuals_of(found.model, here, found.model.values);
   std::vector<SuspectPose> named =
       off_by(here, r, {found.discrepancy, found.discrepancy_rotation, true});
-  const bool alike = are_off_alike(found, here);
-  for (SuspectPose& pose : named) pose.alike = alike;
   named.insert(named.end(), found.suspects.begin(), found.suspects.end());
   std::stable_sort(named.begin(), named.end(),
                    [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });

@@ -1,11 +1,9 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "server/base/result.h"
 #include "server/calibrate/identify/identifiability.h"
 #include "server/calibrate/sessions/session_setting.h"
 #include "server/error_sources/physical_model.h"
@@ -35,8 +33,6 @@ struct CalibrateOptions {
                              ///< no link masses
   bool robust = true;  ///< Huber loss beyond the residual that 1 in 1000 good poses exceeds, so a
                        ///< bad pose has little influence
-  /// Called before each step of a minimisation; a failure gives up.
-  std::function<Status()> go_on = {};
 };
 
 /// A pose whose residual is far above its sigma.
@@ -45,10 +41,6 @@ struct SuspectPose {
   int row = 0;          ///< in its file
   double distance = 0;  ///< m, of the position
   double sigmas = 0;    ///< the distance over the expected standard deviation of one axis
-  bool alike = false;  ///< the rows that fit no arm are off by much the same: something that nobody
-                       ///< recorded differed (add_suspects())
-  bool together = false;  ///< rows beside it in joint space are off as well: no mistake of this
-                          ///< row, but something that the model lacks (together.h)
 };
 
 struct IdentifiedParameter {

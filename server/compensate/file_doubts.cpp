@@ -88,60 +88,21 @@ std::string rows_of(const std::vector<SuspectPose>& suspects) {
   return shown < rows.size() ? fmt::format("{} and {} more", text, rows.size() - shown) : text;
 }
 
-double worst_of(const std::vector<SuspectPose>& suspects) {
-  double worst = 0;
-  for (const SuspectPose& pose : suspects) worst = std::max(worst, pose.distance);
-  return worst;
-}
-
-Severity severity_of(std::size_t suspects, int others) {
-  constexpr double kMany = 0.1;  // of all rows: more than single mistakes
-  const auto count = static_cast<double>(suspects);
-  return count > kMany * (count + others) ? Severity::kStop : Severity::kWarning;
-}
-
 }  // namespace
 
-std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects, int others,
-                                         bool much_is_left) {
-  std::vector<SuspectPose> bad = suspects;
-  std::erase_if(bad, [](const SuspectPose& pose) { return pose.together || pose.alike; });
-  const std::size_t count = bad.size();
+std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects, int others) {
+  constexpr double kMany = 0.1;  // of all rows: more than single mistakes
+  const std::size_t count = suspects.size();
   if (count == 0) return std::nullopt;
+  const bool many = static_cast<double>(count) > kMany * (static_cast<double>(count) + others);
+  double worst = 0;
+  for (const SuspectPose& pose : suspects) worst = std::max(worst, pose.distance);
   return Note{
-      "rows_do_not_fit", severity_of(count, others),
-      fmt::format(
-          "{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly "
-          "{}: {} {}; measure {}{} again",
-          count, count == 1 ? "does" : "do", to_mm(worst_of(bad)), count == 1 ? "counts" : "count",
-          count == 1 ? "row" : "rows", rows_of(bad), count == 1 ? "it" : "them",
-          much_is_left ? " and neighbours (what the model lacks may be largest there)" : "")};
-}
-
-std::optional<Note> rows_off_alike(const std::vector<SuspectPose>& suspects, int others) {
-  std::vector<SuspectPose> alike = suspects;
-  std::erase_if(alike, [](const SuspectPose& pose) { return !pose.alike; });
-  if (alike.empty()) return std::nullopt;
-  return Note{
-      "rows_off_alike", severity_of(alike.size(), others),
-      fmt::format("{} of the measured rows are off by much the same, by up to {:.3g} mm, and "
-                  "the others know nothing of it: was there another load, tool or reflector "
-                  "that nobody recorded? Nothing was learned from rows {}; give them "
-                  "their own tool or payload, or measure them again",
-                  alike.size(), to_mm(worst_of(alike)), rows_of(alike))};
-}
-
-std::optional<Note> rows_off_together(const std::vector<SuspectPose>& suspects, int others) {
-  std::vector<SuspectPose> far = suspects;
-  std::erase_if(far, [](const SuspectPose& pose) { return !pose.together; });
-  if (far.empty()) return std::nullopt;
-  return Note{
-      "rows_off_together", severity_of(far.size(), others),
-      fmt::format("{} of the measured rows {} off by up to {:.3g} mm, and so are rows beside "
-                  "{} in joint space: no mistakes of single rows, but something that the "
-                  "model lacks, which is large there ({} {}; trammel diagnose)",
-                  far.size(), far.size() == 1 ? "is" : "are", to_mm(worst_of(far)),
-                  far.size() == 1 ? "it" : "them", far.size() == 1 ? "row" : "rows", rows_of(far))};
+      "rows_do_not_fit", many ? Severity::kStop : Severity::kWarning,
+      fmt::format("{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly "
+                  "{}: {} {}; measure {} again",
+                  count, count == 1 ? "does" : "do", to_mm(worst), count == 1 ? "counts" : "count",
+                  count == 1 ? "row" : "rows", rows_of(suspects), count == 1 ? "it" : "them")};
 }
 
 bool identifies_geometry(const PhysicalModel& model) {
@@ -266,16 +227,6 @@ Note measurements_rounded(const Rounding& rounding) {
                       rounding.is_of_gauges ? "distances and touches" : "positions",
                       to_mm(rounding.step), to_mm(rounding.stddev()),
                       rounding.is_of_gauges ? "each" : "an axis", to_mm(rounding.sigma))};
-}
-
-std::optional<std::string> joints_rounded(const WhatWasMeasured& measured, double left) {
-  constexpr double kRounded = 0.3;  // of what is left: rounding may be a large part of it
-  const auto& rounding = measured.joint_rounding;
-  if (!rounding || rounding->stddev <= kRounded * left) return std::nullopt;
-  return fmt::format(
-      "all joints are whole multiples of {:g} deg: where a display rounded them, that alone makes "
-      "{:.3f} mm",
-      to_deg(rounding->step), to_mm(rounding->stddev));
 }
 
 namespace {

@@ -1,12 +1,10 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "server/base/note.h"
 #include "server/calibrate/calibration.h"
-#include "server/compensate/what_was_measured.h"
 #include "server/measurement/resolution.h"
 
 namespace trammel {
@@ -19,16 +17,9 @@ constexpr const char* kBaseElsewhere = "base_elsewhere";
 
 /// The note on rows that were measured beside `others` and do not fit them, with the size of their
 /// misfit. If these are more than a tenth, they are not single mistakes, and the note stops the
-/// model. If much is
-/// left in any case, they may show a missing cause. Empty if all rows fit.
+/// model. Empty if all rows fit.
 [[nodiscard]] std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects,
-                                                       int others, bool much_is_left);
-/// The note on suspects that are off alike, which are no single mistakes either; likewise.
-[[nodiscard]] std::optional<Note> rows_off_alike(const std::vector<SuspectPose>& suspects,
-                                                 int others);
-/// The note on suspects that lie together in joint space, which are no bad rows; likewise.
-[[nodiscard]] std::optional<Note> rows_off_together(const std::vector<SuspectPose>& suspects,
-                                                    int others);
+                                                       int others);
 
 /// True if `model` has a source for the lengths and zeros of the arm. Without one, the base and a
 /// bias take up what is wrong with them.
@@ -51,10 +42,6 @@ constexpr const char* kBaseElsewhere = "base_elsewhere";
 
 /// The note on measured numbers that are rounded more coarsely than their stated sigma.
 [[nodiscard]] Note measurements_rounded(const Rounding& rounding);
-/// The doubt, for every door, about joints that are written in whole steps, where that makes a
-/// large part of the `left` (m, of an axis) error. Empty where it does not.
-[[nodiscard]] std::optional<std::string> joints_rounded(const WhatWasMeasured& measured,
-                                                        double left);
 
 /// The note on an arm with lengths that are all longer (or shorter) than drawn by one share. That
 /// is one cause and not many errors of manufacture, and positions do not show which cause. The note

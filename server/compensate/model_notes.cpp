@@ -158,10 +158,8 @@ LeftOver left_over(const CompensatedModel::Parts& parts, double rms, double stat
   return {std::min(rms, std::hypot(parts.discrepancy, stated)), stated};
 }
 
-/// m, of one value: by the rows, else of the least exact instrument of the cell.
-double stated_of_gauges(const CompensatedModel::Parts& parts) {
-  if (parts.measured && parts.measured->stated_of_gauges) return *parts.measured->stated_of_gauges;
-  const Cell& cell = *parts.physics.cell;
+/// m, of one value of the least exact instrument of the cell.
+double stated_of_gauges(const Cell& cell) {
   double stated = 0;
   if (const Result<Anchors> anchors = anchors_of(cell)) {
     for (const auto& [id, anchor] : *anchors)
@@ -179,15 +177,14 @@ LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
   if (parts.training.poses > 0)
     worst = left_over(parts, parts.training.compensated.rms / std::sqrt(3.0), stated);
   if (!parts.training.gauges) return worst;
-  LeftOver gauges = left_over(parts, parts.training.gauges->compensated, stated_of_gauges(parts));
+  LeftOver gauges = left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
   gauges.is_of_gauges = true;
   return gauges.left * worst.stated > worst.left * gauges.stated ? gauges : worst;
 }
 
-constexpr double kLeads = 3;  // times the stated sigma: more is left than an instrument explains
-
 void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
-  constexpr double kStops = 30;  // times the stated sigma
+  constexpr double kLeads = 3, kStops = 30;  // times the stated sigma
+  constexpr double kRounded = 0.3;           // of the remainder: rounding may be a large part of it
   const LeftOver worst = worst_left_over(parts);
   const double times = worst.left / worst.stated;
   if (!(times >= kLeads)) return;
@@ -196,9 +193,14 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
     what =
         "are the anchors where the cell file says, and their planes not askew? is the tool the one "
         "that was used?";
-  else if (const auto rounded = parts.measured ? joints_rounded(*parts.measured, worst.left)
-                                               : std::optional<std::string>())
-    what = *rounded + "; else trammel diagnose";
+  else if (parts.measured && parts.measured->joint_rounding &&
+           parts.measured->joint_rounding->stddev > kRounded * worst.left)
+    what = fmt::format(
+        "all joints are whole multiples of {:g} deg: where a display rounded them, that alone "
+        "makes "
+        "{:.3f} mm; else trammel diagnose",
+        to_deg(parts.measured->joint_rounding->step),
+        to_mm(parts.measured->joint_rounding->stddev));
   notes.push_back(
       {"left_over_sigma", times >= kStops ? Severity::kStop : Severity::kWarning,
        fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm {}, "
@@ -206,16 +208,6 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
                    "not show that the model is right ({})",
                    times, to_mm(worst.left), worst.is_of_gauges ? "a distance or touch" : "an axis",
                    to_mm(worst.stated), what)});
-}
-
-/// Adds the notes on rows that are far off.
-void add_suspects_noted(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
-  const LeftOver left = worst_left_over(parts);
-  const int others = parts.provenance.training_poses;
-  for (auto& note :
-       {rows_that_do_not_fit(parts.suspects, others, left.left >= kLeads * left.stated),
-        rows_off_alike(parts.suspects, others), rows_off_together(parts.suspects, others)})
-    if (note) notes.push_back(*note);
 }
 
 /// Compares orientations with their own sigma, which is often not stated. The note says so if they
@@ -415,7 +407,9 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_left_of_orientations(model.parts(), notes);
   add_overstated(model, notes);
   add_computed_positions(model.parts(), notes);
-  add_suspects_noted(model.parts(), notes);
+  if (auto rows =
+          rows_that_do_not_fit(model.parts().suspects, model.parts().provenance.training_poses))
+    notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
   add_one_place(model.parts(), notes);
   add_sides(model.parts(), notes);

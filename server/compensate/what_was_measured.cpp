@@ -247,7 +247,6 @@ void add_what_is_stated(const PhysicalModel& physics, const MeasurementBatch& ba
   constexpr double kSmall = 1e-6;  // rad
   constexpr std::size_t kAsked = 50;
   measured.stated = sigma_of_rows(batch);
-  measured.stated_of_gauges = sigma_of_gauges(batch);
   measured.rounding = coarse_rounding(batch, *physics.cell);
   const auto step = joint_step(batch);
   if (!step) return;

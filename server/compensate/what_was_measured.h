@@ -35,8 +35,7 @@ struct WhatWasMeasured {
   /// older models.
   Eigen::VectorXd outline;
   std::optional<double> stated;  ///< m: median sigma of the positions; empty: no row has its own
-  std::optional<double> stated_of_gauges;  ///< m: sigma_of_gauges()
-  std::optional<Rounding> rounding;        ///< resolution of the measured numbers, if it is coarse
+  std::optional<Rounding> rounding;  ///< resolution of the measured numbers, if it is coarse
   /// Joints with angles that are whole multiples of a step, and the effect of that rounding on the
   /// tool.
   struct JointRounding {

@@ -1,7 +1,6 @@
 #include "server/diagnose/diagnose.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 
 #include "server/base/check.h"
@@ -24,7 +23,6 @@
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/row_mistakes.h"
 #include "server/diagnose/tell/wording.h"
-#include "server/diagnose/thresholds.h"
 #include "server/error_sources/spelling.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
@@ -210,6 +208,24 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell,
   return result;
 }
 
+/// True if `others` are off by much the same, as seen from the instrument or from the tool: a load
+/// or a tool that nobody recorded shifts rows like that, and no mistake of single rows does.
+bool are_off_alike(const CalibrationResult& found, const MeasurementBatch& others) {
+  constexpr double kAlike = 0.5;  // of their rms: the mean of rows that err by themselves is less
+  const MeasurementBatch here = aligned(others, found.sessions, found.model.cell->tracker);
+  Vector3 mean_W = Vector3::Zero(), mean_T = Vector3::Zero();
+  double square = 0;
+  for (const Measurement& m : here.measurements) {
+    const Pose X_WT = found.model.pose_W(m.context, found.model.values, nullptr);
+    const Vector3 off = m.p_W - X_WT.translation();
+    mean_W += off;
+    mean_T += X_WT.linear().transpose() * off;
+    square += off.squaredNorm();
+  }
+  const auto n = static_cast<double>(here.measurements.size());
+  return std::max(mean_W.norm(), mean_T.norm()) / n > kAlike * std::sqrt(square / n);
+}
+
 /// Removes the rows that fit no arm on which the others agree, as a training does, and lists them
 /// as suspects. Returns true if there are any. `plain`: the calibration on all rows, or why there
 /// is none.
@@ -220,25 +236,19 @@ bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed,
   std::optional<Agreement> agreement = agreement_of(cell, sources, prepared.train, plain);
   if (!agreement) return false;
   Result<CalibrationResult> found = calibrate(cell, sources, agreement->agreeing, {});
-  if (!found) return false;
+  if (!found || (plain && are_off_alike(*found, agreement->others))) return false;
   add_suspects(agreement->others, *found);
   const auto& agreeing = agreement->agreeing.measurements;
   for (const SuspectPose& one : found->suspects) {
     if (std::any_of(agreeing.begin(), agreeing.end(),
                     [&](const Measurement& m) { return m.row == one.row; }))
       continue;
-    diagnosis.suspects.push_back(
-        {.pose_id = one.pose_id,
-         .row = one.row,
-         .distance = one.distance,
-         .reason = one.alike ? "off as the other rows that do not fit are"
-                             : "fits none of the arms on which the other rows agree"});
+    diagnosis.suspects.push_back({.pose_id = one.pose_id,
+                                  .row = one.row,
+                                  .distance = one.distance,
+                                  .reason = "fits none of the arms on which the other rows agree"});
   }
-  if (auto rows = rows_that_do_not_fit(found->suspects, static_cast<int>(agreeing.size()),
-                                       std::hypot(found->discrepancy, cell->tracker.sigma) >=
-                                           thresholds::kNeverNoise * cell->tracker.sigma))
-    diagnosis.notes.push_back(*std::move(rows));
-  if (auto rows = rows_off_alike(found->suspects, static_cast<int>(agreeing.size())))
+  if (auto rows = rows_that_do_not_fit(found->suspects, static_cast<int>(agreeing.size())))
     diagnosis.notes.push_back(*std::move(rows));
   prepared.train = std::move(agreement->agreeing);
   return true;

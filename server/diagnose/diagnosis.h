@@ -219,7 +219,6 @@ struct Diagnosis {
   double noise =
       0;  ///< m per axis: standard deviation of a pose that no cause explains, whatever its reason
   double instrument = 0;  ///< m per axis: standard deviation that is stated for a measurement
-  double vouched = 1;     ///< times the stated sigma: the part of `instrument` that repeats show
   std::string noise_from;
   LeftOver left_position, left_rotation;  ///< m; rad
   ErrorFigures before, after;             ///< of all poses used, before and after extension

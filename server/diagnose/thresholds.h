@@ -179,9 +179,9 @@ inline constexpr double kSigmaKnownTo = 0.1;
 /// counts those of sigma and of chance together; the second counts those of chance alone and leads
 /// to a note.
 inline constexpr double kNoiseDeviations = 2;
-/// Times the stated standard deviation, from which nobody calls it noise, however few the poses are
-/// and whatever repeated poses vouch for.
-inline constexpr double kNeverNoise = 3;
+/// Times the stated standard deviation, beyond which nobody calls it noise: exp(2 * 0.104), of 200
+/// poses.
+inline constexpr double kMoreThanNoise = 1.23;
 
 /// Holm-corrected chance below which the residual depends on a joint, the torque or the time,
 /// although no function was found for it.

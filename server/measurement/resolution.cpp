@@ -32,18 +32,6 @@ std::vector<double> stated_sigmas(const MeasurementBatch& batch, const Cell& cel
   return all;
 }
 
-/// m: the sigmas that rows of one kind have of their own; empty if most have none.
-std::vector<double> own_sigmas(const MeasurementBatch& batch, bool of_gauges) {
-  std::vector<double> all;
-  std::size_t rows = 0;
-  for (const Measurement& m : batch.measurements) {
-    if (m.gauge.has_value() != of_gauges) continue;
-    ++rows;
-    if (m.sigma) all.push_back(*m.sigma);
-  }
-  return 2 * all.size() > rows ? all : std::vector<double>();
-}
-
 /// Each kind of number separately: three coordinates, or gauges.
 std::vector<std::vector<double>> columns_mm(const MeasurementBatch& batch, bool of_gauges) {
   std::vector<std::vector<double>> all(of_gauges ? 1 : 3);
@@ -81,16 +69,13 @@ std::optional<Rounding> coarse_rounding(const MeasurementBatch& batch, const Cel
 }
 
 std::optional<double> sigma_of_rows(const MeasurementBatch& batch) {
-  const std::vector<double> all = own_sigmas(batch, false);
-  return all.empty() ? std::nullopt : std::optional(median(all));
-}
-
-std::optional<double> sigma_of_gauges(const MeasurementBatch& batch) {
-  const std::vector<double> all = own_sigmas(batch, true);
-  if (all.empty()) return std::nullopt;
-  double square = 0;
-  for (const double sigma : all) square += sigma * sigma;
-  return std::sqrt(square / static_cast<double>(all.size()));
+  std::vector<double> all;
+  std::size_t positions = 0;
+  for (const Measurement& m : batch.measurements) {
+    positions += m.gauge ? 0 : 1;
+    if (!m.gauge && m.sigma) all.push_back(*m.sigma);
+  }
+  return 2 * all.size() > positions ? std::optional(median(all)) : std::nullopt;
 }
 
 std::optional<double> joint_step(const MeasurementBatch& batch) {

@@ -30,11 +30,6 @@ struct Rounding {
 /// m: the median of the sigmas that positions have of their own; empty if most have none.
 [[nodiscard]] std::optional<double> sigma_of_rows(const MeasurementBatch& batch);
 
-/// m: the sigmas that distances and touches have of their own or of their instrument
-/// (check_gauge()), rms, since instruments of several kinds may be among them; empty if most have
-/// none.
-[[nodiscard]] std::optional<double> sigma_of_gauges(const MeasurementBatch& batch);
-
 /// rad: the step of the turning joints; empty if they are written finer than 1e-4 deg.
 [[nodiscard]] std::optional<double> joint_step(const MeasurementBatch& batch);
 

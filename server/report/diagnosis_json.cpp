@@ -209,15 +209,12 @@ std::vector<Note> together(std::vector<Note> notes, const std::vector<Note>& mor
 }  // namespace
 
 ordered_json diagnosis_json(const Diagnosis& diagnosis, const std::vector<Note>& notes) {
-  const WhatIsLeft left = what_is_left(diagnosis);
   return {{"verdict", to_string(diagnosis.verdict)},
           {"sentence", diagnosis.sentence},
           {"poses", diagnosis.poses},
           {"noise_mm", to_mm(diagnosis.noise)},
           {"noise_from", diagnosis.noise_from},
           {"instrument_mm", to_mm(diagnosis.instrument)},
-          {"left_over_sigma", left.times},
-          {"looks_like_noise", left.is_noise},
           {"before", figures_json(diagnosis.before)},
           {"after", figures_json(diagnosis.after)},
           {"held_out",

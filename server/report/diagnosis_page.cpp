@@ -150,12 +150,14 @@ std::string tiles(const Diagnosis& diagnosis) {
   const bool held_out = diagnosis.held_out_before && diagnosis.held_out_after;
   const ErrorFigures& before = held_out ? *diagnosis.held_out_before : diagnosis.before;
   const ErrorFigures& after = held_out ? *diagnosis.held_out_after : diagnosis.after;
-  const WhatIsLeft left = what_is_left(diagnosis);
   const char* before_name = held_out ? "rms of poses held out, before" : "rms of all poses, before";
   return tile("before", fmt::format("{:.4f} mm", to_mm(before.rms)), before_name) +
          tile("after", fmt::format("{:.4f} mm", to_mm(after.rms)), "with what was found") +
          tile("noise", fmt::format("{:.4f} mm", to_mm(std::sqrt(3.0) * diagnosis.noise)),
-              html_text(left.name() + ", rms: " + with_micro(left.meaning())).c_str());
+              html_text(
+                  "noise, rms: what is left of a position when all that was found is corrected (" +
+                  with_micro(diagnosis.noise_from) + ")")
+                  .c_str());
 }
 
 HtmlRow figures_row(const char* name, const ErrorFigures& figures) {

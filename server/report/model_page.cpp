@@ -235,13 +235,12 @@ std::string suspects_text(const CompensatedModel::Parts& parts) {
   if (parts.suspects.empty()) return "<p>None: every pose fits the others.</p>\n";
   std::vector<HtmlRow> rows;
   for (const SuspectPose& pose : parts.suspects) {
-    rows.push_back({{html_text(pose.pose_id), fmt::format("{}", pose.row),
-                     fmt::format("{:.3f}", to_mm(pose.distance)),
-                     fmt::format("{:.0f}", pose.sigmas), pose.together ? "off as well" : "fit"}});
+    rows.push_back(
+        {{html_text(pose.pose_id), fmt::format("{}", pose.row),
+          fmt::format("{:.3f}", to_mm(pose.distance)), fmt::format("{:.0f}", pose.sigmas)}});
   }
-  return "<p>These fit the others so badly that their pull was bounded. Measure them again, unless "
-         "the poses beside them are off as well: there the model lacks something.</p>\n" +
-         html_table({"", {"pose", "row", "off by, mm", "sigma", "poses beside it"}, rows}) + "\n";
+  return "<p>These fit the others so badly that their pull was bounded. Measure them again.</p>\n" +
+         html_table({"", {"pose", "row", "off by, mm", "sigma"}, rows}) + "\n";
 }
 
 /// The section on causes that the measurements chose; empty if none were chosen.

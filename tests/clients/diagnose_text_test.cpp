@@ -89,17 +89,6 @@ TEST(DiagnoseText, SaysWhatWouldNotHaveBeenNamedForCertainAndHowLargeTheNoiseIs)
   }
 }
 
-TEST(DiagnoseText, WhatIsFarAboveTheStatedSigmaIsNoNoise) {
-  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
-  diagnosis.noise = 3.1 * diagnosis.instrument;
-  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
-  EXPECT_NE(text.find("150 poses. Left unexplained: 53.7 um rms, what is left of a position when "
-                      "all that was found is corrected (3.1 times the stated sigma; the tracker)"),
-            std::string::npos)
-      << text;
-  EXPECT_EQ(text.find("Noise:"), std::string::npos) << text;
-}
-
 TEST(DiagnoseText, APoseThatMayShowWhatTheSimulationLacksIsNotCalledABadOne) {
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   Finding out{.cause = {.cause = "outlier", .pose_id = "p9"}, .effect_rms = 1e-3};

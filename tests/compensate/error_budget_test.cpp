@@ -329,10 +329,6 @@ TEST(ErrorBudget, TellsAHealthyArmThatNothingStandsOut) {
             std::string::npos)
       << in_words(budget_of(model)).front();
   EXPECT_EQ(lead_of(budget_of(model)), "");
-  const BudgetLine* rest = budget_of(model).line("rest");
-  ASSERT_NE(rest, nullptr);
-  EXPECT_NE(rest->name.find("no more than an uncertain sigma makes"), std::string::npos)
-      << rest->name;
 }
 
 TEST(ErrorBudget, OfABaseThatStandsElsewhereIsNothingBeyondFrames) {
@@ -382,7 +378,6 @@ TEST(ErrorBudget, OfAModelWithoutAnyParameterIsWhatIsLeft) {
   const BudgetLine* rest = budget.line("rest");
   ASSERT_NE(rest, nullptr);
   EXPECT_NEAR(1e3 * rest->alone_rms, 2, 0.05);
-  EXPECT_NE(rest->name.find("by none of the lines above"), std::string::npos) << rest->name;
 }
 
 TEST(ErrorBudget, SaysWhatEachStepLeaves) {

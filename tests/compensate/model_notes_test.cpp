@@ -158,29 +158,6 @@ TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
       << "diagnose takes no distances: " << left(500).front().text;
 }
 
-TEST(ModelNotes, WhatIsLeftOfDistancesIsHeldAgainstTheSigmaOfTheirRows) {
-  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
-  const double sigma = 20 * parts.physics.cell->tracker.sigma;
-  MeasurementBatch rows;
-  rows.measurements.resize(12);
-  for (Measurement& m : rows.measurements) {
-    m.context.q = JointVector::Constant(6, 0.1);
-    m.gauge.emplace();
-    m.sigma = sigma;
-  }
-  parts.measured.emplace();
-  add_what_is_stated(parts.physics, rows, *parts.measured);
-  parts.training.gauges.emplace().rows = 12;
-  const auto is_noted = [&](double times) {
-    parts.discrepancy = parts.training.gauges->compensated = times * sigma;
-    const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
-    return std::any_of(notes.begin(), notes.end(),
-                       [](const Note& note) { return note.code == "left_over_sigma"; });
-  };
-  EXPECT_FALSE(is_noted(2)) << "the cell's sigma is a twentieth of what the rows state";
-  EXPECT_TRUE(is_noted(3.1));
-}
-
 TEST(ModelNotes, PositionsThatTheDrawingHasBetterThanTheInstrumentMeasuresWereComputed) {
   const auto codes = [](double times, int poses) {
     CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();

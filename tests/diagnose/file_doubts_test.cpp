@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -130,46 +129,6 @@ TEST(FileDoubts, AForgottenHayatiRowIsToldAndNoCauseOfItsJointsIsSure) {
       EXPECT_FALSE(finding.could_also_be.empty()) << found.sentence;
     }
   }
-}
-
-TEST(RowsThatDoNotFit, ThatAreOffAlikeAreToldAsALoadThatNobodyRecordedByBothDoors) {
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 6);
-  std::vector<int> loaded;
-  for (std::size_t i = 30; i < 52; ++i) {
-    batch.measurements[i].p_W += Vector3(0.3e-3, 0, -4e-3 + 1e-4 * static_cast<double>(i % 7));
-    loaded.push_back(batch.measurements[i].row);
-  }
-  const Diagnosis found = diagnosed(test::cell_7(), batch);
-  std::vector<int> named;
-  for (const SuspectedPose& one : found.suspects) named.push_back(one.row);
-  std::sort(named.begin(), named.end());
-  EXPECT_EQ(named, loaded) << found.sentence;
-  ASSERT_FALSE(found.notes.empty()) << found.sentence;
-  EXPECT_EQ(found.notes.front().code, "rows_off_alike");
-  EXPECT_TRUE(found.sentence.starts_with("22 of the measured rows are off by much the same"))
-      << found.sentence;
-  TrainOptions options;
-  options.bias = "none";
-  const auto stop = stop_of(test::demand(train(test::cell_7(), batch, options)));
-  ASSERT_TRUE(stop);
-  EXPECT_EQ(stop->text, found.notes.front().text) << "a training and a diagnosis say it alike";
-}
-
-TEST(FileDoubts, JointsInWholeDegreesAreToldByBothDoors) {
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 8);
-  for (Measurement& m : batch.measurements)
-    for (double& q : m.context.q) q = from_deg(std::round(to_deg(q)));
-  const std::string rounded = "all joints are whole multiples of 1 deg: where a display rounded";
-  const Diagnosis found = diagnosed(test::cell_7(), batch);
-  EXPECT_TRUE(std::any_of(found.notes.begin(), found.notes.end(), [&](const Note& note) {
-    return note.code == "joints_rounded" && note.text.find(rounded) == 0;
-  })) << found.sentence;
-  TrainOptions options;
-  options.bias = "none";
-  const std::vector<Note> notes = notes_of(test::demand(train(test::cell_7(), batch, options)));
-  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [&](const Note& note) {
-    return note.text.find(rounded) != std::string::npos;
-  }));
 }
 
 TEST(RowsThatDoNotFit, AreNamedAsATrainingNamesThemWhereAllTogetherLeadToNoArm) {

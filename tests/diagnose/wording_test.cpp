@@ -129,39 +129,13 @@ TEST(Wording, IsUnknownWhereMoreIsLeftThanAnyDoubtfulFindingExplains) {
 }
 
 TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
-  EXPECT_EQ(noise_name({11e-6, 9e-6, 200}, 9e-6), "noise of one measurement");
-  EXPECT_EQ(noise_name({12e-6, 9e-6, 6}, 9e-6), "noise of one measurement") << "by chance, of few";
-  EXPECT_EQ(noise_name({12e-6, 9e-6, 200}, 9e-6), "what stays unexplained of a pose");
-  EXPECT_EQ(noise_name({28e-6, 9e-6, 2}, 9e-6), "what stays unexplained of a pose");
+  EXPECT_EQ(noise_name(11e-6, 9e-6), "noise of one measurement");
+  EXPECT_EQ(noise_name(70e-6, 9e-6), "what stays unexplained of a pose");
   Diagnosis real = with({});
   real.unexplained = {true, {}, 1.2e-4, 1e-12, "more than noise is left: 4 times"};
   EXPECT_EQ(sentence_for(real),
             "More than noise is left: 4 times. No single joint, torque or time was found with "
             "which it changes.");
-}
-
-TEST(Wording, CallsNothingNoiseFromThreeTimesTheStatedSigmaOn) {
-  Diagnosis few = with({});
-  few.noise = 28e-6;  // few poses: chance might make it
-  few.instrument = 9e-6;
-  few.left_position = {28e-6, 9e-6, 2};
-  few.after.rms = 40e-6;
-  EXPECT_EQ(sentence_for(few).find("noise"), std::string::npos) << sentence_for(few);
-  EXPECT_NE(sentence_for(few).find("40 um rms are left, 3.1 times the stated sigma"),
-            std::string::npos)
-      << sentence_for(few);
-  EXPECT_EQ(what_is_left(few).name(), "left unexplained");
-  EXPECT_NE(what_is_left(few).meaning().find("(3.1 times the stated sigma; "), std::string::npos);
-  few.noise = 20e-6;
-  few.left_position.left = few.noise;
-  few.after.rms = 30e-6;
-  EXPECT_NE(sentence_for(few).find("which looks like noise"), std::string::npos);
-  EXPECT_EQ(what_is_left(few).name(), "noise");
-  few.instrument = 25e-6;  // repeated poses vouch for 2.8 times the stated 9 um
-  few.vouched = 25.0 / 9;
-  few.noise = few.left_position.left = 28e-6;
-  few.left_position.stated = few.instrument;
-  EXPECT_EQ(what_is_left(few).name(), "left unexplained");
 }
 
 TEST(Wording, SaysThatPositionsWereComputedWhereTheyAreBetterThanTheInstrument) {

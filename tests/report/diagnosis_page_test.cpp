@@ -151,14 +151,6 @@ TEST_F(DiagnosisPage, SaysOneFigureOfNoiseAndWhatItIs) {
   EXPECT_FALSE(test::has(page, "per axis")) << "one figure";
 }
 
-TEST_F(DiagnosisPage, WhatIsFarAboveTheStatedSigmaIsNoNoise) {
-  diagnosis_.noise = 3.1 * diagnosis_.instrument;
-  const std::string page = diagnosis_page(diagnosis_, *cell_);
-  EXPECT_TRUE(test::has(page, "<span>left unexplained, rms: what is left of a position"));
-  EXPECT_TRUE(test::has(page, "3.1 times the stated sigma"));
-  EXPECT_FALSE(test::has(page, "<span>noise"));
-}
-
 TEST_F(DiagnosisPage, AChanceThatIsSmallerThanAnythingKnownIsNoEquality) {
   diagnosis_.unexplained = {true, {"q4"}, 5e-5, 1e-6, ""};
   EXPECT_TRUE(test::has(diagnosis_page(diagnosis_, *cell_),

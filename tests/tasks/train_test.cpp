@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <set>
 
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
@@ -91,28 +90,6 @@ TEST(Train, WhereTwoRowsInFiveAreBadTheOthersAreLearnedAsIfTheyHadBeenAlone) {
             test::demand(train(cell, good, quick("M3", "none"))).parts().physics.values);
   EXPECT_EQ(model.parts().training.poses, 36);
   EXPECT_EQ(model.parts().suspects.size(), 24u);
-}
-
-TEST(Train, BadRowsThatAreHeldOutDoNotJudgeAndAreNamed) {
-  const auto cell = test::cell_7();
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 100, 46);
-  std::set<int> held_out_and_bad;
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
-    Measurement& m = batch.measurements[i];
-    m.set = i % 5 == 0 ? MeasurementSet::kValidation : MeasurementSet::kTrain;
-    if (i % 20 != 0 && i % 20 != 3) continue;  // a quarter of those held out, others as well
-    m.p_W += Vector3(0, 12e-3, -9e-3);
-    if (i % 5 == 0) held_out_and_bad.insert(m.row);
-  }
-  const CompensatedModel model = test::demand(train(cell, batch, quick("M3", "none")));
-  ASSERT_TRUE(model.parts().validation);
-  EXPECT_EQ(model.parts().validation->poses, 15);
-  EXPECT_LT(to_mm(model.parts().validation->compensated.rms), 0.05);
-  std::set<int> named;
-  for (const SuspectPose& one : model.parts().suspects) named.insert(one.row);
-  EXPECT_EQ(named.size(), 10U);
-  EXPECT_TRUE(
-      std::includes(named.begin(), named.end(), held_out_and_bad.begin(), held_out_and_bad.end()));
 }
 
 TEST(Train, ABadPoseIsNotLearned) {
@@ -226,43 +203,6 @@ TEST(Train, AutoTakesNoBiasWhereThePhysicsIsCompleteAndThePhysicsItselfWhereItIs
   EXPECT_EQ(test::demand(train(cell, batch, quick("M2", "auto"))).provenance().hash,
             lacking.provenance().hash);
   EXPECT_FALSE(test::demand(train(cell, batch, quick("M2", "se"))).parts().bias_choice);
-}
-
-TEST(Train, AutoNamesBadRowsInsteadOfRefusingTheBatch) {
-  const auto cell = test::cell_7();
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 80, 62);
-  std::set<int> bad;
-  for (Measurement& m : batch.measurements) {
-    const double k = m.row;
-    if (m.row % 20 >= 7) continue;  // 35 %
-    m.p_W += 0.4 * Vector3(std::sin(7 * k), std::cos(5 * k), std::sin(3 * k)).normalized();
-    bad.insert(m.row);
-  }
-  ASSERT_EQ(bad.size(), 28U);
-  const CompensatedModel model = test::demand(train(cell, batch, quick("auto", "none")));
-  std::set<int> named;
-  for (const SuspectPose& one : model.parts().suspects) named.insert(one.row);
-  EXPECT_EQ(named, bad);
-  EXPECT_LT(to_mm(model.parts().training.compensated.rms), 0.05);
-}
-
-TEST(Train, ProgressMovesWhileItCalibrates) {
-  const auto cell = test::cell_7();
-  const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 63);
-  TrainOptions options = quick("M3,joint_map:2,joint_map:3", "none");
-  std::set<std::string> stages;
-  options.progress = [&](const std::string& stage, double) {
-    if (stage.starts_with("calibrating")) stages.insert(stage);
-    return true;
-  };
-  ASSERT_TRUE(train(cell, batch, options));
-  EXPECT_GT(stages.size(), 10U);
-  options.progress = [&](const std::string& stage, double) {
-    return stage != "calibrating, step 7";
-  };
-  const auto given_up = train(cell, batch, options);
-  ASSERT_FALSE(given_up);
-  EXPECT_EQ(given_up.error().code, ErrorCode::kBusy) << sentence(given_up.error());
 }
 
 TEST(Train, GivesUpWhenAsked) {

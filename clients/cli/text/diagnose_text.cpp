@@ -315,13 +315,11 @@ std::string next_poses_text(const ordered_json& diagnosis) {
 /// The residual of a pose as one length, comparable with the other errors.
 std::string noise_line(const ordered_json& diagnosis) {
   const double noise = diagnosis.at("noise_mm"), root = std::sqrt(3.0);
-  // A server that does not say it calls it noise.
-  const WhatIsLeft left = {diagnosis.value("left_over_sigma", 1.0),
-                           diagnosis.value("looks_like_noise", true), diagnosis.at("noise_from")};
-  std::string name = as_sentence(left.name());
-  name.pop_back();
-  return fmt::format("{} poses. {}: {} rms, {}.\n", diagnosis.at("poses").get<int>(), name,
-                     micrometres(root * noise), left.meaning());
+  return fmt::format(
+      "{} poses. Noise: {} rms, what is left of a position when all that was found is corrected "
+      "({}).\n",
+      diagnosis.at("poses").get<int>(), micrometres(root * noise),
+      diagnosis.at("noise_from").get<std::string>());
 }
 
 std::string extended_line(const char* name, const CompensatedModel& model) {

@@ -320,12 +320,10 @@ std::string unidentifiable_text(const std::vector<UnidentifiableCombination>& co
 std::string suspects_text(const std::vector<SuspectPose>& suspects) {
   if (suspects.empty()) return "";
   std::string text =
-      "poses that do not fit the others (bounded in their pull; measure them again, unless those "
-      "beside them are off as well):\n";
+      "poses that do not fit the others (bounded in their pull; measure them again):\n";
   for (const SuspectPose& pose : suspects) {
-    text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma{}\n", pose.pose_id,
-                        pose.row, to_mm(pose.distance), pose.sigmas,
-                        pose.together ? "; so are the poses beside it" : "");
+    text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma\n", pose.pose_id, pose.row,
+                        to_mm(pose.distance), pose.sigmas);
   }
   return text;
 }
@@ -420,8 +418,7 @@ ordered_json suspects_json(const std::vector<SuspectPose>& suspects) {
     list.push_back({{"pose_id", pose.pose_id},
                     {"row", pose.row},
                     {"distance_mm", to_mm(pose.distance)},
-                    {"sigmas", pose.sigmas},
-                    {"together", pose.together}});
+                    {"sigmas", pose.sigmas}});
   }
   return list;
 }

@@ -37,6 +37,17 @@ bool is_listed(const std::vector<std::string>& specs, const CauseRecord& record)
                      [&](const std::string& spec) { return find_cause(spec) == &record; });
 }
 
+/// The sources that every training identifies, whatever the data show.
+std::vector<std::string> always_identified(const Cell& cell, const std::vector<std::string>& kept) {
+  std::vector<std::string> specs = spelled_out(kept, cell);
+  for (const causes::Part part : {causes::Part::kBase, causes::Part::kLinks, causes::Part::kTool}) {
+    const CauseRecord& record = cause_correcting(part);
+    if (part == causes::Part::kTool && cell.tools.empty()) continue;
+    if (!is_listed(specs, record)) specs.emplace_back(record.spelling);
+  }
+  return with_unknown_tool(std::move(specs), cell);
+}
+
 /// The compliance that a load needs in order to show; null for other causes. Neither of the two is
 /// linear without the other.
 const CauseRecord* gives_way_under(const CauseRecord& record) {
@@ -285,16 +296,6 @@ class CauseSearch {
 };
 
 }  // namespace
-
-std::vector<std::string> always_identified(const Cell& cell, const std::vector<std::string>& kept) {
-  std::vector<std::string> specs = spelled_out(kept, cell);
-  for (const causes::Part part : {causes::Part::kBase, causes::Part::kLinks, causes::Part::kTool}) {
-    const CauseRecord& record = cause_correcting(part);
-    if (part == causes::Part::kTool && cell.tools.empty()) continue;
-    if (!is_listed(specs, record)) specs.emplace_back(record.spelling);
-  }
-  return with_unknown_tool(std::move(specs), cell);
-}
 
 Result<ChosenCauses> choose_causes(const std::shared_ptr<const Cell>& cell,
                                    const std::vector<std::string>& kept,

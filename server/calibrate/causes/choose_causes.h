@@ -23,9 +23,4 @@ struct ChosenCauses {
     const MeasurementBatch& batch,
     const std::function<Status(double share)>& go_on = [](double) { return Status(); });
 
-/// The sources that every choice identifies, whatever the data show: `kept`, base, geometry and
-/// tool.
-[[nodiscard]] std::vector<std::string> always_identified(const Cell& cell,
-                                                         const std::vector<std::string>& kept);
-
 }  // namespace trammel

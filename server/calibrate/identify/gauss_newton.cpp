@@ -158,7 +158,6 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
   const Eigen::VectorXd lower = s.lower();
   Minimum now{start.cwiseMax(lower), {}, {}, false, "too many steps"};
   for (int k = 0; k < std::max(1, options.max_iterations) && !now.converged; ++k) {
-    if (options.go_on && !options.go_on()) return std::nullopt;
     Expansion at = expand(problem, s, weights, is_robust(options, weights), now.x);
     if (!std::isfinite(at.cost) || (k > 0 && at.cost > now.costs.back() + kNoRise))
       return std::nullopt;
@@ -280,7 +279,6 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
   std::vector<double> costs = {search.now.at.cost};
   for (int k = 0; k < std::max(1, options.max_iterations) && std::isfinite(search.best.at.cost);
        ++k) {
-    if (options.go_on) TRY(options.go_on());
     const JointStep step = joint_step(search.now, lower, search.damping);
     const bool settled =
         search.damping == 0 &&

@@ -323,8 +323,6 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem,
   result.discrepancy_of_pose = found.weights.of_pose;
   result.log_evidence = result.log_likelihood = log_likelihood(r, found.weights);
   result.suspects = suspects_of(problem.batch, r, found.weights);
-  mark_together(problem.model.cell->robot, problem.batch,
-                farness_of(problem.batch, r, found.weights), result.suspects);
   result.rms = r.rms();
   result.converged = found.minimum.converged;
   result.sessions = found.sessions;

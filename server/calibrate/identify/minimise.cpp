@@ -3,7 +3,6 @@
 #include <ceres/ceres.h>
 
 #include <cmath>
-#include <functional>
 
 #include "server/calibrate/identify/weighted_pose.h"
 #include "server/measurement/sessions.h"
@@ -48,21 +47,6 @@ class PriorCost final : public ceres::CostFunction {
   Eigen::VectorXd prior_;
 };
 
-/// Asks before each step whether to go on.
-class AskedToGoOn final : public ceres::IterationCallback {
- public:
-  explicit AskedToGoOn(const std::function<Status()>& go_on) : go_on_(go_on) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& /*step*/) override {
-    answer_ = go_on_ ? go_on_() : Status();
-    return answer_ ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
-  }
-  [[nodiscard]] const Status& answer() const { return answer_; }
-
- private:
-  const std::function<Status()>& go_on_;
-  Status answer_;
-};
-
 /// By Levenberg-Marquardt, from any start.
 Result<Minimum> guarded_steps(const CalibrationProblem& problem, const ScaledParameters& s,
                               const Weights& weights, const CalibrateOptions& calibrate_options,
@@ -88,11 +72,8 @@ Result<Minimum> guarded_steps(const CalibrationProblem& problem, const ScaledPar
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-8;
   options.logging_type = ceres::SILENT;
-  AskedToGoOn asked(calibrate_options.go_on);
-  options.callbacks.push_back(&asked);
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_problem, &summary);
-  TRY(asked.answer());
   if (!summary.IsSolutionUsable()) {
     return refused("calibration of batch {}: the solver failed: {}", problem.batch.id,
                    summary.message);
@@ -114,7 +95,6 @@ Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParamete
   if (has_sessions(problem.batch)) return session_steps(problem, s, weights, options, start);
   if (std::optional<Minimum> found = full_steps(problem, s, weights, options, start))
     return std::move(*found);
-  if (options.go_on) TRY(options.go_on());
   if (Result<Minimum> found = session_steps(problem, s, weights, options, start);
       found && found->converged)
     return found;

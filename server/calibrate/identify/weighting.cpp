@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "server/base/units.h"
-#include "server/calibrate/identify/together.h"
 #include "server/error_sources/anchors.h"
 #include "server/measurement/pose_groups.h"
 
@@ -289,26 +288,6 @@ std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& 
     add(r.gauges[static_cast<std::size_t>(i)], std::abs(r.gauge(i)),
         sigmas_of_gauge(r, i, weights));
   return all;
-}
-
-bool is_far_off(double distance, double sigma) { return distance > kSuspect * sigma; }
-
-void mark_together(const Chain& robot, const MeasurementBatch& batch,
-                   const Eigen::VectorXd& farness, std::vector<SuspectPose>& suspects) {
-  if (suspects.empty()) return;
-  std::vector<std::size_t> far;
-  const auto& rows = batch.measurements;
-  const auto is_of = [](const SuspectPose& pose, const Measurement& m) {
-    return pose.row == m.row && pose.pose_id == m.pose_id;
-  };
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    if (std::any_of(suspects.begin(), suspects.end(),
-                    [&](const SuspectPose& pose) { return is_of(pose, rows[i]); }))
-      far.push_back(i);
-  const std::vector<std::size_t> together = together_in_joints(robot, batch, farness, far);
-  for (SuspectPose& pose : suspects)
-    pose.together = std::any_of(together.begin(), together.end(),
-                                [&](std::size_t i) { return is_of(pose, rows[i]); });
 }
 
 std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r,

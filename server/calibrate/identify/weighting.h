@@ -87,12 +87,6 @@ struct Freedom {
 /// The deviation of each measurement, those with a position first.
 [[nodiscard]] std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r,
                                               const Weights& weights);
-/// True if a position `distance` (m) from where it is expected lies farther off than 1 in 10^6 good
-/// ones would. `sigma`: m, expected standard deviation of one axis.
-[[nodiscard]] bool is_far_off(double distance, double sigma);
-/// Sets SuspectPose::together of `suspects`, which are rows of `batch`.
-void mark_together(const Chain& robot, const MeasurementBatch& batch,
-                   const Eigen::VectorXd& farness, std::vector<SuspectPose>& suspects);
 /// Poses that lie farther off than 1 in 10^6 good ones would, farthest first.
 [[nodiscard]] std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch,
                                                    const Residuals& r, const Weights& weights);

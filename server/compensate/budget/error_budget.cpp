@@ -186,23 +186,13 @@ double stated_mean_square(const MeasurementBatch& positions, const Cell& cell) {
   return sum / static_cast<double>(positions.measurements.size());
 }
 
-/// The name of a rest of `square` m² beside the `stated` noise. It claims no more than was looked
-/// for: the lines of the budget, and what a bias learned.
-const char* name_of_rest(double square, double stated, bool has_bias) {
-  constexpr double kSigmaKnownTo = 1.23;  // times: an uncertain sigma makes no more (2 of 0.104)
-  if (square <= kSigmaKnownTo * kSigmaKnownTo * stated)
-    return "what is left beyond the noise, no more than an uncertain sigma makes";
-  if (has_bias) return "what is left, by none of the lines above and not learned";
-  return "what is left, by none of the lines above (trammel diagnose looks for other causes)";
-}
-
 /// Splits the residual into the stated noise of the instrument and the rest.
 void add_rest(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& total, double stated,
-              bool has_bias, BudgetView& view) {
+              BudgetView& view) {
   const double whole = mean_square(total);
   const double of_instrument = std::min(stated, mean_square(rest));
   BudgetLine left =
-      sized(named(LineKind::kRest, name_of_rest(mean_square(rest), stated, has_bias)), rest, total);
+      sized(named(LineKind::kRest, "what is left, by no cause that is known"), rest, total);
   left.share -= whole > 0 ? of_instrument / whole : 0;
   left.alone_rms = std::sqrt(mean_square(rest) - of_instrument);
   view.lines.push_back(std::move(left));
@@ -249,7 +239,7 @@ BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
   view.lines.push_back(
       sized(named(LineKind::kTogether, "what the lines do together"), seen(together), total));
   if (!asked.untold.with.empty()) view.lines.push_back(asked.untold);
-  add_rest(seen(asked.effects.rest), total, asked.stated, asked.has_bias, view);
+  add_rest(seen(asked.effects.rest), total, asked.stated, view);
   return view;
 }
 

@@ -232,13 +232,10 @@ Status read_calibration(const Json& content, const std::string& where, ModelPart
   parts.condition_number = number_from(content, "condition_number");
   parts.observability_index = number_from(content, "observability_index");
   for (const Json& pose : list_from(content.at("suspects"))) {
-    parts.suspects.push_back(
-        {.pose_id = pose.at("pose_id"),
-         .row = whole_from<int>(pose, "row"),
-         .distance = number_from(pose, "distance_m"),
-         .sigmas = number_from(pose, "sigmas"),
-         .alike = pose.contains("alike") && truth_from(pose.at("alike")),
-         .together = pose.contains("together") && truth_from(pose.at("together"))});
+    parts.suspects.push_back({.pose_id = pose.at("pose_id"),
+                              .row = whole_from<int>(pose, "row"),
+                              .distance = number_from(pose, "distance_m"),
+                              .sigmas = number_from(pose, "sigmas")});
   }
   parts.cost_record = numbers_from(content.at("cost_record"));
   parts.discrepancy = number_from(content, "discrepancy_m");
@@ -262,7 +259,6 @@ WhatWasMeasured measured_from(const Json& json) {
   measured.reach = number_if(json, "reach_m");
   if (json.contains("outline_m")) measured.outline = vector_from(json.at("outline_m"));
   measured.stated = number_if(json, "stated_m");
-  measured.stated_of_gauges = number_if(json, "stated_of_gauges_m");
   if (json.contains("rounding")) {
     const Json& rounding = json.at("rounding");
     measured.rounding = {number_from(rounding, "step_m"), number_from(rounding, "sigma_m"),

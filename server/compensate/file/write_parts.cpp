@@ -113,13 +113,10 @@ Json json_of(const UnidentifiableCombination& u) {
 }
 
 Json json_of(const SuspectPose& pose) {
-  Json json = {{"pose_id", pose.pose_id},
-               {"row", pose.row},
-               {"distance_m", pose.distance},
-               {"sigmas", pose.sigmas}};
-  if (pose.alike) json["alike"] = true;
-  if (pose.together) json["together"] = true;
-  return json;
+  return {{"pose_id", pose.pose_id},
+          {"row", pose.row},
+          {"distance_m", pose.distance},
+          {"sigmas", pose.sigmas}};
 }
 
 Json json_of(const SessionSetting& session) {
@@ -242,7 +239,6 @@ Json json_of(const WhatWasMeasured& measured) {
   if (measured.reach) json["reach_m"] = *measured.reach;
   if (measured.outline.size() > 0) json["outline_m"] = matrix_json(measured.outline);
   if (measured.stated) json["stated_m"] = *measured.stated;
-  if (measured.stated_of_gauges) json["stated_of_gauges_m"] = *measured.stated_of_gauges;
   if (measured.rounding)
     json["rounding"] = {{"step_m", measured.rounding->step},
                         {"sigma_m", measured.rounding->sigma},

@@ -93,7 +93,7 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
 /// The error that is left after the nominal chain, the cell's own sources and each finding in turn;
 /// the last step is the unexplained rest.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
-                                        const LinearProblem& after, WaterfallStep last) {
+                                        const LinearProblem& after, double noise) {
   std::vector<WaterfallStep> steps;
   Eigen::Matrix3Xd nominal(3, before.poses());
   for (Index i = 0; i < before.poses(); ++i) {
@@ -120,7 +120,7 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
                   [&](Index k) { return std::find(own.begin(), own.end(), k) != own.end(); });
   }
   steps.insert(steps.end(), tail.rbegin(), tail.rend());
-  steps.push_back(std::move(last));
+  steps.push_back({noise_name(noise, after.instrument()), std::sqrt(3.0) * noise});
   return steps;
 }
 
@@ -154,7 +154,6 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
   diagnosis.poses = static_cast<int>(explained.found.all.measurements.size());
   diagnosis.noise = after.noise();
   diagnosis.instrument = after.instrument();
-  diagnosis.vouched = prepared.vouched;
   diagnosis.noise_from = fmt::format(
       "{}the tracker's stated sigma alone gives {:.1f} um",
       prepared.repeats.degrees_of_freedom > 0
@@ -166,10 +165,7 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
   const LinearProblem& served = explained.served;
   diagnosis.before = figures_of(before.positions(before.residual()));
   diagnosis.after = figures_of(served.positions(served.residual()));
-  const LeftOver left{after.noise(), after.instrument(), after.position_spread().freedom};
-  diagnosis.waterfall = waterfall_of(
-      explained.found, before, served,
-      {noise_name(left, after.instrument() / prepared.vouched), std::sqrt(3.0) * left.left});
+  diagnosis.waterfall = waterfall_of(explained.found, before, served, after.noise());
   const Matrix3 R_BW = explained.found.before.model.X_WB.linear().transpose();
   diagnosis.residual_after_B = R_BW * served.positions(served.residual());
   diagnosis.residual_before_B = R_BW * before.positions(before.residual());

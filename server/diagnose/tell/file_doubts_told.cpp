@@ -1,13 +1,10 @@
 #include "server/diagnose/tell/file_doubts_told.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/calibrate/calibrate.h"
 #include "server/compensate/file_doubts.h"
-#include "server/compensate/what_was_measured.h"
 #include "server/diagnose/tell/wording.h"
-#include "server/diagnose/thresholds.h"
 #include "server/measurement/resolution.h"
 #include "server/measurement/sessions.h"
 #include "server/robot/cell_doubts.h"
@@ -28,20 +25,6 @@ Cause tilt_of(int joint) {
   Cause tilt = cause_at(cause_correcting(causes::Part::kLinks));
   tilt.parameter = fmt::format("beta{}", joint + 1);
   return tilt;
-}
-
-/// The note on joints in whole steps, where more than three times the stated sigma is left.
-std::optional<Note> rounding_of_joints(const CalibrationResult& found,
-                                       const MeasurementBatch& batch) {
-  const double sigma = sigma_of_rows(batch).value_or(found.model.cell->tracker.sigma);
-  const double left = std::hypot(found.discrepancy, sigma);
-  if (left < thresholds::kNeverNoise * sigma) return std::nullopt;
-  WhatWasMeasured measured;
-  add_what_is_stated(found.model, batch, measured);
-  const std::optional<std::string> doubt = joints_rounded(measured, left);
-  if (!doubt) return std::nullopt;
-  return Note{"joints_rounded", Note::Severity::kWarning,
-              *doubt + ": write the joints with all digits that the controller has"};
 }
 
 }  // namespace
@@ -76,7 +59,6 @@ void tell_file_doubts(const std::shared_ptr<const Cell>& cell,
     if (!has_sessions(batch)) add(base_elsewhere(found->model));
     add(lengths_scaled(found->model, found->parameters, found->covariance));
   }
-  if (found) add(rounding_of_joints(*found, batch));
   if (const auto rounding = coarse_rounding(batch, *cell)) add(measurements_rounded(*rounding));
   for (const CellDoubt& doubt : doubts_of(*cell))
     if (doubt.of_robot_file)

@@ -1,12 +1,10 @@
 #include "server/diagnose/tell/wording.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/base/units.h"
 #include "server/compensate/budget/budget_words.h"
 #include "server/diagnose/search/surrogates.h"
-#include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/thresholds.h"
 #include "server/measurement/computed_positions.h"
 #include "server/plan/separation.h"
@@ -109,48 +107,11 @@ bool is_never_shown(const Diagnosis& diagnosis, const Cause& cause) {
   });
 }
 
-bool looks_like_noise(const LeftOver& left, double sigma) {
-  return cause_search::judge_noise(left) != cause_search::NoiseVerdict::kMoreThanNoise &&
-         left.left < cause_search::thresholds::kNeverNoise * sigma;
+std::string noise_name(double noise, double instrument) {
+  return noise > cause_search::thresholds::kMoreThanNoise * instrument
+             ? "what stays unexplained of a pose"
+             : "noise of one measurement";
 }
-
-std::string noise_name(const LeftOver& left, double sigma) {
-  return looks_like_noise(left, sigma) ? "noise of one measurement"
-                                       : "what stays unexplained of a pose";
-}
-
-std::string WhatIsLeft::name() const { return is_noise ? "noise" : "left unexplained"; }
-
-std::string WhatIsLeft::meaning() const {
-  return fmt::format("what is left of a position when all that was found is corrected ({}{})",
-                     is_noise ? "" : fmt::format("{:.1f} times the stated sigma; ", times),
-                     noise_from);
-}
-
-namespace {
-
-/// What is left as one axis of a position, of `left` m. Nothing is judged where nothing is stated.
-WhatIsLeft left_as(const Diagnosis& d, double left) {
-  if (!(d.instrument > 0)) return {1, true, d.noise_from};
-  const double sigma = d.instrument / d.vouched;
-  return {left / sigma, looks_like_noise({left, d.instrument, d.left_position.freedom}, sigma),
-          d.noise_from};
-}
-
-/// `12 um rms are left, which looks like noise`; beyond noise it says how far.
-std::string left_said(const Diagnosis& d) {
-  const WhatIsLeft left = left_as(d, std::max(d.noise, d.after.rms / std::sqrt(3.0)));
-  return fmt::format("{:.0f} um rms are left, {}", 1e6 * d.after.rms,
-                     left.is_noise
-                         ? "which looks like noise"
-                         : fmt::format("{:.1f} times the stated sigma, and no known cause that "
-                                       "these poses can show explains it",
-                                       left.times));
-}
-
-}  // namespace
-
-WhatIsLeft what_is_left(const Diagnosis& diagnosis) { return left_as(diagnosis, diagnosis.noise); }
 
 std::string why_no_next_poses(const std::vector<Finding>& findings) {
   const auto doubt = std::find_if(findings.begin(), findings.end(), [](const Finding& finding) {
@@ -317,7 +278,8 @@ std::string sentence_for(const Diagnosis& d) {
     auto computed = computed_by_its_arm(d.before.rms, d.poses);
     if (!computed && d.budget)
       computed = computed_not_measured(d.budget->beyond_frames.error_rms, d.instrument, d.poses);
-    add(nothing + computed.value_or(left_said(d)));
+    add(nothing + computed.value_or(fmt::format("{:.0f} um rms are left, which looks like noise",
+                                                1e6 * d.after.rms)));
   }
   add(advice_said(d));
   return text;

@@ -26,22 +26,9 @@ namespace trammel {
 /// True if the batch shows nothing of the cause, so that its separation from others is not worth
 /// reporting.
 [[nodiscard]] bool is_never_shown(const Diagnosis& diagnosis, const Cause& cause);
-/// True if what is left may be called noise: it is not more than chance and the uncertainty of
-/// sigma allow, and less than three times `sigma`, the one of the cell file or of the rows.
-[[nodiscard]] bool looks_like_noise(const LeftOver& left, double sigma);
-/// The name of what is left of a pose: the noise of one measurement, or what stays unexplained.
-[[nodiscard]] std::string noise_name(const LeftOver& left, double sigma);
-/// What is left of a position when all that was found is corrected, for every door: its name, and
-/// what it means.
-struct WhatIsLeft {
-  double times = 1;        ///< the stated sigma
-  bool is_noise = true;    ///< looks_like_noise()
-  std::string noise_from;  ///< what else is known of the noise
-
-  [[nodiscard]] std::string name() const;
-  [[nodiscard]] std::string meaning() const;
-};
-[[nodiscard]] WhatIsLeft what_is_left(const Diagnosis& diagnosis);
+/// The name of a noise of `noise` m per axis: that of one measurement, or more than the stated one
+/// of the `instrument`.
+[[nodiscard]] std::string noise_name(double noise, double instrument);
 /// The reason why no next poses are suggested, given that only these `findings` could need them.
 [[nodiscard]] std::string why_no_next_poses(const std::vector<Finding>& findings);
 /// The verdict for people: the missing causes, the largest first; their share of the error; the

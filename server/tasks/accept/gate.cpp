@@ -514,10 +514,7 @@ std::vector<JudgingSession> sessions_of_today(const GateQuestion& question) {
   return today;
 }
 
-namespace {
-
-/// The verdict by the rows of `question` as they are.
-GateVerdict judged_by_all(const GateQuestion& question, const GateOptions& options) {
+GateVerdict judge(const GateQuestion& question, const GateOptions& options) {
   const std::vector<const Measurement*> judges = judges_in(question.sessions);
   if (judges.empty()) return no("no pose was held out to judge it", {}, kAdvice);
   const Rows rows = rows_of(question.candidate, question.sessions);
@@ -529,34 +526,6 @@ GateVerdict judged_by_all(const GateQuestion& question, const GateOptions& optio
   if (overflows) return no("its held-out rms is not finite", {});
   if (question.in_force == nullptr) return judge_first(question, options);
   return Duel(question, sessions_of_today(question), options).verdict();
-}
-
-/// ` (judged without p7, which fits neither model)`
-std::string without_bad(const std::vector<std::string>& poses, bool several_models) {
-  constexpr std::size_t kMost = 12;
-  if (poses.empty()) return "";
-  std::vector<std::string> shown(
-      poses.begin(), poses.begin() + static_cast<std::ptrdiff_t>(std::min(poses.size(), kMost)));
-  if (poses.size() > kMost) shown.push_back(fmt::format("{} more", poses.size() - kMost));
-  const bool one = poses.size() == 1;
-  return fmt::format(" (judged without {}, which {})", fmt::join(shown, ", "),
-                     !several_models ? one ? "does not fit the others" : "do not fit the others"
-                     : one           ? "fits neither model"
-                                     : "fit neither model");
-}
-
-}  // namespace
-
-GateVerdict judge(const GateQuestion& question, const GateOptions& options) {
-  GateQuestion good = question;
-  std::vector<const CompensatedModel*> models = {&question.candidate};
-  if (question.in_force != nullptr) models.push_back(&question.in_force->model);
-  const std::vector<std::string> bad = take_out_bad_judges(good.sessions, models);
-  GateVerdict verdict = judged_by_all(good, options);
-  const std::string without = without_bad(bad, models.size() > 1);
-  verdict.message += without;
-  verdict.why += without;
-  return verdict;
 }
 
 }  // namespace trammel

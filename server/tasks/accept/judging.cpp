@@ -6,7 +6,6 @@
 #include <map>
 #include <utility>
 
-#include "server/calibrate/agreement.h"
 #include "server/compensate/known_rows.h"
 #include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
@@ -263,56 +262,6 @@ LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession
     at += n;
   }
   return all;
-}
-
-namespace {
-
-/// For each judge of `session`, how many of the models know it, and how many miss it by far.
-struct Missed {
-  std::vector<int> known, by_far;
-};
-
-Missed missed_by(const std::vector<const CompensatedModel*>& models,
-                 const JudgingSession& session) {
-  const std::size_t n = session.judges.measurements.size();
-  Missed missed{std::vector<int>(n, 0), std::vector<int>(n, 0)};
-  for (const CompensatedModel* model : models) {
-    const LocatedErrors errors = located_errors(*model, session);
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto column = static_cast<Eigen::Index>(i);
-      if (!errors.position.col(column).allFinite()) continue;
-      ++missed.known[i];
-      missed.by_far[i] +=
-          is_bad_row(errors.position.col(column).norm(), errors.expected(column) / std::sqrt(3.0))
-              ? 1
-              : 0;
-    }
-  }
-  return missed;
-}
-
-}  // namespace
-
-std::vector<std::string> take_out_bad_judges(std::vector<JudgingSession>& sessions,
-                                             const std::vector<const CompensatedModel*>& models) {
-  std::vector<std::string> left_out;
-  for (JudgingSession& session : sessions) {
-    std::vector<Measurement>& rows = session.judges.measurements;
-    const Missed missed = missed_by(models, session);
-    std::vector<Measurement> good;
-    std::vector<std::string> bad;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (missed.known[i] > 0 && missed.by_far[i] == missed.known[i]) {
-        bad.push_back(rows[i].pose_id);
-      } else {
-        good.push_back(rows[i]);
-      }
-    }
-    if (bad.empty() || are_too_many_bad(bad.size(), rows.size())) continue;
-    rows = std::move(good);
-    left_out.insert(left_out.end(), bad.begin(), bad.end());
-  }
-  return left_out;
 }
 
 double coverage(const std::vector<JointVector>& poses, const JointVector& q_min,

@@ -59,14 +59,6 @@ enum class JudgedLevel { kNominal, kCompensated };
                                            const JudgingSession& session,
                                            JudgedLevel level = JudgedLevel::kCompensated);
 
-/// Removes the rows of `sessions` that are bad, and returns their pose ids: rows that lie farther
-/// from each of `models` than 1 in 10^6 good ones would, by the rule for fitted rows
-/// (is_bad_row()). A row that some model does not know counts by the others. Where too
-/// many rows of a session are so (are_too_many_bad()), the models are at fault and all its rows
-/// judge.
-std::vector<std::string> take_out_bad_judges(std::vector<JudgingSession>& sessions,
-                                             const std::vector<const CompensatedModel*>& models);
-
 /// The share of the joint ranges [q_min, q_max] (rad) that the poses cover, for the joint with the
 /// least: the middle 80 % of the poses over 80 % of the range, so a single pose far out does not
 /// count. Joints with a range below 1e-3 rad do not count.

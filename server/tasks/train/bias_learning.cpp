@@ -107,12 +107,12 @@ void forget_bias(CompensatedModel::Parts& parts) {
   parts.bias_spread = 1;
 }
 
-/// The batch without bad rows. Those that lie together are what a bias learns. A smooth function
-/// would spread the error of such rows over their neighbours.
+/// The batch without suspects. A smooth function would spread the error of such rows over their
+/// neighbours.
 MeasurementBatch without_suspects(const CompensatedModel::Parts& parts, MeasurementBatch batch) {
   std::erase_if(batch.measurements, [&](const Measurement& m) {
     return std::any_of(parts.suspects.begin(), parts.suspects.end(), [&](const SuspectPose& pose) {
-      return !pose.together && pose.pose_id == m.pose_id && pose.row == m.row;
+      return pose.pose_id == m.pose_id && pose.row == m.row;
     });
   });
   return batch;

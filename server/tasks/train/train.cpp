@@ -5,7 +5,6 @@
 
 #include "server/calibrate/agreement.h"
 #include "server/calibrate/batch_check.h"
-#include "server/calibrate/calibrate.h"
 #include "server/calibrate/calibrate_with_maps.h"
 #include "server/calibrate/causes/choose_causes.h"
 #include "server/calibrate/frames/frames.h"
@@ -62,33 +61,11 @@ Result<Asked> asked_of(const Cell& cell, const TrainOptions& options) {
 /// Reports the current step. Returns false to give up.
 using Report = std::function<bool(const std::string& stage, double share)>;
 
-/// Reports each step of the minimisations, which nobody can count before: their number moves, and
-/// the share stays at `share`.
-std::function<Status()> counting_steps(const Report& report, double share) {
-  return [&report, share, steps = 0]() mutable -> Status {
-    if (!report(fmt::format("calibrating, step {}", ++steps), share)) return given_up();
-    return {};
-  };
-}
-
 /// The share of a training after which each of its parts is done, by their times.
 struct PartsDone {
   double choice, physics, bias;
 };
 constexpr PartsDone kPhysicsKnown = {0, 0.3, 0.9}, kPhysicsChosen = {0.1, 0.75, 0.9};
-
-/// The rows by which causes are chosen: bad rows would choose causes of their own, or lead to no
-/// arm at all. Judged by the sources that every choice keeps.
-MeasurementBatch rows_that_agree(const std::shared_ptr<const Cell>& cell,
-                                 const std::vector<std::string>& kept, const MeasurementBatch& rows,
-                                 const Report& report) {
-  const std::vector<std::string> sources = always_identified(*cell, kept);
-  CalibrateOptions options;
-  options.go_on = counting_steps(report, 0);
-  const auto plain = calibrate(cell, sources, rows, options);
-  std::optional<Agreement> agreement = agreement_of(cell, sources, rows, plain, options.go_on);
-  return agreement ? std::move(agreement->agreeing) : rows;
-}
 
 /// The sources to identify from these rows; what was chosen goes into `choice`. Distances and
 /// touches do not choose: with them the usual sources are identified.
@@ -100,12 +77,10 @@ Result<std::vector<std::string>> sources_of(const std::shared_ptr<const Cell>& c
   if (!asked.chosen_by_data) return with_unknown_tool(std::move(asked.sources), *cell);
   if (has_gauges(rows)) return with_unknown_tool(cell->model.error_sources, *cell);
   if (!report("choosing causes", 0)) return given_up();
-  const MeasurementBatch agreeing = rows_that_agree(cell, asked.sources, rows, report);
-  ChosenCauses chosen =
-      TRY(choose_causes(cell, asked.sources, agreeing, [&](double share) -> Status {
-        if (!report("choosing causes", kPhysicsChosen.choice * share)) return given_up();
-        return {};
-      }));
+  ChosenCauses chosen = TRY(choose_causes(cell, asked.sources, rows, [&](double share) -> Status {
+    if (!report("choosing causes", kPhysicsChosen.choice * share)) return given_up();
+    return {};
+  }));
   choice = std::move(chosen.choice);
   return std::move(chosen.sources);
 }
@@ -177,32 +152,14 @@ Status add_training_figures(CompensatedModel::Parts& parts, const MeasurementBat
   return {};
 }
 
-/// Removes the bad rows from those that judge, and names them beside the fitted ones.
-void name_bad_judges(CompensatedModel::Parts& parts, MeasurementBatch& judges) {
-  MeasurementBatch known = judges;
-  std::erase_if(known.measurements, [&](const Measurement& m) {
-    return !parts.trained_with.contains({m.context.tool, m.context.payload});
-  });
-  const std::vector<SuspectPose> bad = take_out_bad_rows(known, parts.physics, parts.discrepancy);
-  if (bad.empty()) return;
-  std::erase_if(judges.measurements, [&](const Measurement& m) {
-    return std::any_of(bad.begin(), bad.end(),
-                       [&](const SuspectPose& one) { return one.row == m.row; });
-  });
-  parts.suspects.insert(parts.suspects.end(), bad.begin(), bad.end());
-  std::stable_sort(parts.suspects.begin(), parts.suspects.end(),
-                   [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
-}
-
 /// The model with its figures on the poses it was trained on and on those held out.
-Result<CompensatedModel> validated(CompensatedModel::Parts parts, BatchSplit split,
+Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split,
                                    const Report& report) {
   const auto go_on = [&](double share) -> Status {
     if (!report("validating", std::lerp(kPhysicsKnown.bias, 1.0, share))) return given_up();
     return {};
   };
   TRY(go_on(0));
-  name_bad_judges(parts, split.validation);
   TRY(add_training_figures(parts, split.train));
   TRY(go_on(0.4));
   Result<CompensatedModel> bare = CompensatedModel::make(parts);
@@ -262,7 +219,7 @@ Result<CompensatedModel> train_from(const CompensatedModel& from,
   }
   refit.parts.sessions_left_out = std::move(unplaced);
   record_stamp(refit.parts, batch, options);
-  return validated(std::move(refit.parts), std::move(split), report);
+  return validated(std::move(refit.parts), split, report);
 }
 
 /// Parts of a calibrated model; the slope is that of its physics.
@@ -288,11 +245,10 @@ Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch,
                                          const std::shared_ptr<const Cell>& cell,
                                          const std::vector<std::string>& sources,
                                          const TrainOptions& options, const Report& report) {
-  const std::function<Status()> go_on = counting_steps(report, parts_done(*cell, options).choice);
   const Identify identify = [&](const std::vector<std::string>& names) {
-    return options.fleet ? calibrate_among_twins(cell, names, batch, *options.fleet)
-                         : calibrate_with_maps(cell, names, batch,
-                                               {.held = {}, .weigh_links = true, .go_on = go_on});
+    return options.fleet
+               ? calibrate_among_twins(cell, names, batch, *options.fleet)
+               : calibrate_with_maps(cell, names, batch, {.held = {}, .weigh_links = true});
   };
   return identify_sessions(identify, sources, batch, [&](double share) -> Status {
     const PartsDone done = parts_done(*cell, options);
@@ -310,8 +266,7 @@ Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain,
                                               const std::vector<std::string>& sources,
                                               const TrainOptions& options, const Report& report) {
   const auto calibration = plain.map([](const IdentifiedSessions& all) { return all.calibration; });
-  std::optional<Agreement> agreement = agreement_of(
-      cell, sources, batch, calibration, counting_steps(report, parts_done(*cell, options).choice));
+  std::optional<Agreement> agreement = agreement_of(cell, sources, batch, calibration);
   if (!agreement) return plain;
   Result<IdentifiedSessions> found =
       identified_on(agreement->agreeing, cell, sources, options, report);
@@ -358,7 +313,7 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell,
                }));
   if (no_choice) parts.bias_choice = BiasChoice{kNoBias, {}, kNoBiasOfGauges};
   record_training(parts, batch, split.train, options);
-  return validated(std::move(parts), std::move(split), report);
+  return validated(std::move(parts), split, report);
 }
 
 /// Refuses features that do not work with gauges: a bias, since a kernel learns position errors of
@@ -395,12 +350,8 @@ Status check_read(const MeasurementBatch& batch, const Cell& cell, const TrainOp
 
 Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBatch& batch,
                                const TrainOptions& options) {
-  bool stopped = false;  // a step that gives up may look like a fit that fails
-  double so_far = 0;
   const Report report = [&](const std::string& stage, double share) {
-    so_far = std::max(so_far, share);
-    stopped = stopped || (options.progress && !options.progress(stage, so_far));
-    return !stopped;
+    return !options.progress || options.progress(stage, share);
   };
   if (options.from) {
     TRY(check_may_start_from(*options.from, *cell, batch.rows(), options.refit));
@@ -415,7 +366,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
   Result<CompensatedModel> model =
       options.from ? train_from(*options.from, cell, batch, split, options, report)
                    : train_anew(cell, batch, split, options, report);
-  if (stopped || (model && !report("done", 1.0))) return given_up();
+  if (model && !report("done", 1.0)) return given_up();
   return model;
 }
 
