@@ -5,6 +5,7 @@
 #include <deque>
 #include <latch>
 #include <memory>
+#include <semaphore>
 #include <vector>
 
 #include "tests/support/http_client.h"
@@ -229,8 +230,10 @@ TEST_F(BoundedServerTest, MoreRequestsThanMayWaitAreSentAwayAtOnce) {
   HttpLimits limits;
   limits.workers = 1;
   limits.waiting = 2;
+  std::counting_semaphore<> begun(0);
   std::latch over(1);
   start(limits, [&](const HttpAsk&) -> HttpReply {
+    begun.release();
     over.wait();
     return {200, "text/plain; charset=utf-8", "late"};
   });
@@ -238,6 +241,7 @@ TEST_F(BoundedServerTest, MoreRequestsThanMayWaitAreSentAwayAtOnce) {
   for (int i = 0; i < 6; ++i) {
     waiting.push_back(std::make_unique<OpenConnection>(kPort));
     waiting.back()->send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    if (i == 0) begun.acquire();  // until its request is read, it is one of those that are slow
   }
   EXPECT_EQ(parse_http(waiting.back()->read(seconds(10))).code, 503);
   over.count_down();
@@ -250,15 +254,20 @@ TEST_F(BoundedServerTest, WhatHasAWorkerOfItsOwnIsAnsweredWhileEverythingElseIsH
   HttpLimits limits;
   limits.workers = 1;
   limits.apart = {"healthz"};
+  std::counting_semaphore<> begun(0);
   std::latch over(1);
   start(limits, [&](const HttpAsk& ask) -> HttpReply {
-    if (ask.path != std::vector<std::string>{"healthz"}) over.wait();
+    if (ask.path != std::vector<std::string>{"healthz"}) {
+      begun.release();
+      over.wait();
+    }
     return echo(ask);
   });
   std::vector<std::unique_ptr<OpenConnection>> others;
   for (int i = 0; i < 100; ++i) {
     others.push_back(std::make_unique<OpenConnection>(kPort));
     others.back()->send("GET /page HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    if (i == 0) begun.acquire();  // until its request is read, it is one of those that are slow
   }
   EXPECT_EQ(http_get(kPort, "/healthz").body, "healthz|");
   over.count_down();
